@@ -39,30 +39,22 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
-_HOMES = {
-    "BagError": "errors",
-    "BoomTwinError": "errors",
-    "LivePage": "monitor.live_page",
-    "Report": "types",
-    "Sample": "types",
-    "Scene": "scene",
-    "SceneError": "errors",
-    "SceneWarning": "errors",
-    "SessionWriter": "bag.session_writer",
-    "Settings": "config.settings",
-    "SolverError": "errors",
-    "Stream": "types",
-    "TimeWindow": "bag.time_window",
-    "Twin": "twin.twin",
-    "UsageError": "errors",
-    "frequency_response": "analysis.frequency_response",
-    "load_scene": "scene",
-    "load_settings": "config.settings",
-    "replay": "offline.replay",
-    "simulate": "analysis.simulate",
-    "statics": "analysis.equilibrium",
-    "undeflected": "analysis.initial_state",
+_NAMES = {
+    "analysis.equilibrium": "statics",
+    "analysis.frequency_response": "frequency_response",
+    "analysis.initial_state": "undeflected",
+    "analysis.simulate": "simulate",
+    "bag.session_writer": "SessionWriter",
+    "bag.time_window": "TimeWindow",
+    "config.settings": "Settings load_settings",
+    "errors": "BagError BoomTwinError SceneError SceneWarning SolverError UsageError",
+    "monitor.live_page": "LivePage",
+    "offline.replay": "replay",
+    "scene": "Scene load_scene",
+    "twin.twin": "Twin",
+    "types": "Report Sample Stream",
 }
+_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 __all__ = [
     "BagError",

@@ -59,17 +59,12 @@ FaultKind = Literal["fault", "warning", "note"]
 class Fault:
     """Fault in a scene, or an irregularity that is only a warning."""
 
-    path: str
-    """Place in the words of the file: ``sections[1].root.mass``."""
-    value: Any
-    """Value that stands there; `ABSENT` if there is none."""
-    bound: str
-    """What would be allowed."""
+    path: str  # place in the words of the file: ``sections[1].root.mass``
+    value: Any  # value that stands there; `ABSENT` if there is none
+    bound: str  # what would be allowed
     remedy: str
-    line: int | None = None
-    """Line of the file, from 1."""
-    kind: FaultKind = "fault"
-    """``warning`` if the scene can be used; ``note`` if ``check --strict`` lets it pass, too."""
+    line: int | None = None  # line of the file, from 1
+    kind: FaultKind = "fault"  # ``warning`` if the scene can be used; ``note`` if ``check --strict`` lets it pass, too
 
     def __str__(self) -> str:
         where = self.path if self.line is None else f"line {self.line}: {self.path}"
@@ -97,12 +92,9 @@ def _shortened(value: Any, width: int = 60) -> str:
 class SceneError(BoomTwinError):
     """Error of a scene that cannot be used."""
 
-    source: str
-    """The file, or where else the scene came from."""
-    faults: tuple[Fault, ...]
-    """All faults, in the order of the file."""
-    oddities: tuple[Fault, ...]
-    """What would only have been a `SceneWarning`; often the cause of a fault."""
+    source: str  # the file, or where else the scene came from
+    faults: tuple[Fault, ...]  # all faults, in the order of the file
+    oddities: tuple[Fault, ...]  # what would only have been a `SceneWarning`; often the cause of a fault
 
     def __init__(self, source: str, faults: tuple[Fault, ...], oddities: tuple[Fault, ...] = ()) -> None:
         self.source, self.faults, self.oddities = source, faults, oddities

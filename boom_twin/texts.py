@@ -73,6 +73,7 @@ SENTENCES = {
     "off": Sentence("{thing}, or the length transducer beside it, reads wrong", "Compare both at rest, then set the zero"),
     "off cylinder_force": Sentence("{thing} reads wrong", "Check the sensor's zero and scale"),
     "gap": Sentence("cylinder lengths were missing", "Check cable and driver of the length transducers"),
+    "gap joint_angles": Sentence("joint angles were missing", "Check cable and driver of the angle sensors"),
     "clock": Sentence("a clock was set", "Nothing, if it was on purpose"),
     "": Sentence("{thing} does not behave as the model", "Look at it"),
 }

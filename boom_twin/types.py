@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum, StrEnum
 from math import pi
 from typing import TYPE_CHECKING, Any, Literal
 
 from .predictions import Estimate, Prediction
+from .sensor_kinds import SensorKind, gyro_kind, imu_kind
 from .texts import alarm_text
 
 if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
@@ -23,11 +24,8 @@ else:
     ComplexArray = Any
 
 
-NANO = 1e-9
-"""Seconds in a nanosecond: stamps are whole nanoseconds, spans of time are seconds."""
-
-SECOND = 1_000_000_000
-"""Nanoseconds in a second."""
+NANO = 1e-9  # s in a nanosecond: stamps are whole nanoseconds, spans of time are seconds
+SECOND = 1_000_000_000  # ns in a second
 
 HELD = frozenset({"leap", "late", "second source"})
 """Events of samples that were left out, unless a later report gives them as `Report.earlier`."""
@@ -86,149 +84,19 @@ class StrokeReading(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Place of a sensor in the plane of the boom.
+    """Place of a sensor in the plane of the boom."""
 
-    Attributes
-    ----------
-    section : int or None
-        From 1 at the base; None is the last section.
-    at : float or None
-        Distance from the section's inboard pivot along it, m; None is its outboard pivot.
-    turned : float
-        Angle of the sensor's x axis to the section, positive anticlockwise (as a section is raised), rad.
-    """
-
-    section: int | None = None
-    at: float | None = None
-    turned: float = 0.0
+    section: int | None = None  # from 1 at the base; None is the last section
+    at: float | None = None  # distance from the section's inboard pivot along it, m; None is its outboard pivot
+    turned: float = 0.0  # angle of the sensor's x axis to the section, positive as a section is raised, rad
 
 
-NO_PLACES: Mapping[str, Place] = {}
-"""Places of a boom whose only placed sensor is the tip IMU, at the tip."""
-
-G = 9.80665
-"""Standard gravity, m/s^2."""
-
-
-@dataclass(frozen=True, slots=True)
-class SensorKind:
-    """Sensors of one stream."""
-
-    title: str
-    """Name for people."""
-    message: str
-    """Type of its messages: a JointState, read by names, or another one, read by `axes`."""
-    stem: str
-    """Start of its channel names: ``joint`` gives ``joint_1`` .. ``joint_n``."""
-    ends: tuple[str, ...]
-    """Ends of its channel names, if there is not one channel for each joint: ``x`` gives ``tip_imu_x``."""
-    units: dict[str, float]
-    """Size of each unit in the SI unit, which is the first."""
-    noise: str
-    resolution: str
-    """Fields of `boom_twin.config.settings.Settings` with noise and resolution; an empty name stands for 0."""
-    lack: str
-    """What is missing without these sensors; empty if few rigs have them."""
-    field: str = "position"
-    """Field that is read: of a JointState ``position`` or ``effort``, of another message the vector with the `axes`."""
-    axes: tuple[str, ...] = ()
-    """Axes of that vector, one for each channel; empty if messages are read by names."""
-    beside: str = ""
-    """Input whose messages hold these readings, too, if they have no topic of their own."""
-    gives: str = ""
-    """Stream that these readings are converted to when they are decoded; they have channels in messages only."""
-    is_placed: bool = False
-    """True if a boom has these sensors only where a mapping places them."""
-
-    def is_at(self, places: Collection[str]) -> bool:
-        """Return True if any of these sensors has a place; places are those of a stem, or of single channels of one."""
-        return self.stem in places or any(not self.ends and place.rpartition("_")[0] == self.stem for place in places)
-
-    part: str = ""
-    """Stem of the names in messages, if it differs: a force is that of ``cylinder_1``."""
-    shown: str = ""
-    """The unit, one of `units`, in which pictures and the live page show residuals; by default the SI unit."""
-    alarms: tuple[str, ...] = ("stuck", "dropout", "range", "jump", "spikes", "noise")
-    """Alarms of a single sensor. Jumps, spikes and noise count only if its quantity changes little per reading."""
-
-    @property
-    def is_accelerometer(self) -> bool:
-        """Return True for the accelerometers of an IMU."""
-        return self.field == "linear_acceleration"
-
-    @property
-    def is_named(self) -> bool:
-        """Return True if its messages are read by names."""
-        return not self.axes
-
-    @property
-    def named(self) -> str:
-        """Stem of the names in messages."""
-        return self.part or self.stem
-
-    @property
-    def unit(self) -> str:
-        """SI unit."""
-        return next(iter(self.units))
-
-    @property
-    def unit_suffix(self) -> str:
-        """SI unit as the end of a key or of a column's name: ``rad``, ``m_s2``."""
-        return self.unit.replace("/", "_").replace("^", "").replace(" ", "")
-
-    @property
-    def shown_unit(self) -> tuple[float, str]:
-        """Factor from SI to the unit that residuals are shown in, and that unit as it is printed."""
-        unit = self.shown or self.unit
-        return 1.0 / self.units[unit], unit.replace("^2", "²")
-
-    def channels(self, joints: int) -> tuple[str, ...]:
-        """Return the names of the channels in the order of a sample, of a boom with so many joints."""
-        if self.gives:
-            return tuple(f"{self.stem}_{i}_{end}" for i in range(1, joints + 1) for end in self.ends)
-        return tuple(f"{self.stem}_{end}" for end in self.ends or range(1, joints + 1))
-
-
-def _imu(stem: str, lack: str = "") -> SensorKind:
-    """Return the accelerometers of an IMU."""
-    return SensorKind(
-        title=stem.replace("tip_imu", "tip IMU").replace("imu_", "IMU "),
-        message="sensor_msgs/msg/Imu",
-        stem=stem,
-        ends=("x", "z"),
-        units={"m/s^2": 1.0, "g": G, "mg": 1e-3 * G},
-        noise="imu_sigma",
-        resolution="",
-        lack=lack,
-        field="linear_acceleration",
-        axes=("x", "z"),
-        is_placed=not lack,
-        alarms=("stuck",),
-    )
-
-
-def _gyro(imu: SensorKind) -> SensorKind:
-    """Return the gyro of an IMU, which reads how fast its place is raised."""
-    return replace(
-        imu,
-        title=f"{imu.title} gyro",
-        ends=("rate",),
-        units={"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": pi / 180.0},
-        noise="rate_sigma",
-        lack="",
-        field="angular_velocity",
-        axes=("y",),
-        beside=imu.stem,
-        shown="mrad/s",
-    )
-
+NO_PLACES: Mapping[str, Place] = {}  # of a boom whose only placed sensor is the tip IMU, at the tip
 
 SENSORS: dict[Stream, SensorKind] = {
     Stream.STROKES: SensorKind(
         title="cylinder strokes",
-        message="sensor_msgs/msg/JointState",
         stem="cylinder",
-        ends=(),
         units={"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
         noise="stroke_sigma",
         resolution="stroke_resolution",
@@ -237,43 +105,34 @@ SENSORS: dict[Stream, SensorKind] = {
     ),
     Stream.ANGLES: SensorKind(
         title="joint angles",
-        message="sensor_msgs/msg/JointState",
         stem="joint",
-        ends=(),
         units={"rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0, "gon": pi / 200.0},
         noise="angle_sigma",
         resolution="angle_resolution",
         lack="there are no joint residuals",
         shown="mrad",
     ),
-    Stream.IMU: _imu("tip_imu", "there are no residuals of the tip's acceleration (optional)"),
+    Stream.IMU: imu_kind("tip_imu", "there are no residuals of the tip's acceleration (optional)"),
     Stream.FORCES: SensorKind(
         title="cylinder forces",
-        message="sensor_msgs/msg/JointState",
         stem="cylinder_force",
-        ends=(),
         units={"N": 1.0, "daN": 10.0, "kN": 1e3, "lbf": 4.4482216152605},
         noise="force_sigma",
         resolution="force_resolution",
-        lack="",
         field="effort",
         part="cylinder",
         alarms=("stuck", "dropout"),
     ),
 }
-SENSORS[Stream.RATE] = _gyro(SENSORS[Stream.IMU])
+SENSORS[Stream.RATE] = gyro_kind(SENSORS[Stream.IMU])
 for _accelerometer, _rate in ((Stream.IMU_2, Stream.RATE_2), (Stream.IMU_3, Stream.RATE_3), (Stream.IMU_4, Stream.RATE_4)):
-    SENSORS[_accelerometer] = _imu(_accelerometer.value)
-    SENSORS[_rate] = _gyro(SENSORS[_accelerometer])
+    SENSORS[_accelerometer] = imu_kind(_accelerometer.value)
+    SENSORS[_rate] = gyro_kind(SENSORS[_accelerometer])
 SENSORS[Stream.MOMENTS] = SensorKind(
     title="bending moments",
-    message="sensor_msgs/msg/JointState",
     stem="moment",
-    ends=(),
     units={"N m": 1.0, "kN m": 1e3},
     noise="moment_sigma",
-    resolution="",
-    lack="",
     field="effort",
     is_placed=True,
     shown="kN m",
@@ -287,8 +146,6 @@ for _point in (Stream.POINT, Stream.POINT_2):
         ends=("x", "z"),
         units={"m": 1.0, "mm": 1e-3},
         noise="point_sigma",
-        resolution="",
-        lack="",
         field="point",
         axes=("x", "z"),
         is_placed=True,
@@ -297,13 +154,10 @@ for _point in (Stream.POINT, Stream.POINT_2):
     )
 SENSORS[Stream.PRESSURES] = SensorKind(
     title="cylinder pressures",
-    message="sensor_msgs/msg/JointState",
     stem="cylinder",
     ends=("cap", "rod"),
     units={"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "psi": 6894.757293168},
     noise="pressure_sigma",
-    resolution="",
-    lack="",
     field="effort",
     gives=Stream.FORCES.value,
 )
@@ -371,6 +225,18 @@ class Sample:
     of the cylinders, positive in tension. ``MOMENTS``: (n,) N m, positive where the outboard end is bent up. ``POINT``,
     ``POINT_2``: (2,) m, forward and up. NaN where the message had no value; a value beyond `LIMIT` counts as none.
     """
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Clock of a stream against that of the strokes, as estimated."""
+
+    lag: float
+    lag_sigma: float
+    """By which its stamps are late, and the standard deviation, s."""
+    drift: float
+    drift_sigma: float
+    """Rate at which the lag grows, and the standard deviation; 1e-6 is 1 ppm."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,14 +11,29 @@ from boom_twin import Scene
 from boom_twin.analysis.equilibrium import Equilibrium
 from boom_twin.analysis.undeflected import UndeflectedBoom
 from boom_twin.compiler.compile import compile_scene
-from boom_twin.plots.boom import draw_boom, named_pins
-from boom_twin.plots.style import BLUE, GREY, INK, ORANGE, picture, side_view
+from boom_twin.plots.boom import draw_base, draw_cylinder, draw_link, draw_pin, draw_section, named_pins, section_parts
+from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture, side_view
 from boom_twin.scene.kinematics import Skeleton, joint_angles_of_strokes, skeleton
 from boom_twin.scene.schema import section_depth
 from boom_twin.types import Array
 
 EXAGGERATION = 10.0
 TIMES = "\N{MULTIPLICATION SIGN}"
+
+
+def draw_boom(axes: Any, scene: Scene, bones: Skeleton, alpha: float = 0.55) -> None:
+    """Draw base, sections, cylinders, links and pins of an undeformed boom."""
+    size = 0.035 * float(sum(section.length for section in scene.sections))
+    for i in range(len(scene.sections)):
+        draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i), alpha)
+    for joint, part in zip(bones.joints, scene.joints, strict=True):
+        draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, part.cylinder.closed_length, 0.22 * size)
+        for corners, colour in zip(joint.links, (GREEN, PURPLE), strict=False):
+            draw_link(axes, corners, colour, 3.0)
+        for pin in named_pins(joint).values():
+            draw_pin(axes, pin, 4.0)
+    draw_base(axes, bones.pivots[0], size)
+    draw_base(axes, bones.joints[0].barrel_pin, 0.5 * size)
 
 
 def boom_picture(scene: Scene, equilibrium: Equilibrium, path: Path, title: str, note: str) -> None:

@@ -8,11 +8,26 @@ from boom_twin.bag.recovery.recover import Recovery, recover
 from boom_twin.bag.session_files import sensor_message, write_session
 from boom_twin.bag.session_model import mapping_of, scene_of
 from boom_twin.bag.session_sheet import SessionSheet
-from boom_twin.bag.writer import FILE_NAME, SessionWriter
+from boom_twin.bag.writer import FILE_NAME, MessageWriter
 from boom_twin.messages.mapping import load_mapping
 from boom_twin.offline.ground_truth import load_truth
 
 __all__ = [
-    "FILE_NAME", "Recovery", "Session", "SessionSheet", "SessionWriter", "load_mapping", "load_truth", "mapping_of", "read",
-    "read_both", "read_metadata", "recover", "scan", "scene_of", "sensor_message", "write_metadata", "write_session",
+    "FILE_NAME",
+    "MessageWriter",
+    "Recovery",
+    "Session",
+    "SessionSheet",
+    "load_mapping",
+    "load_truth",
+    "mapping_of",
+    "read",
+    "read_both",
+    "read_metadata",
+    "recover",
+    "scan",
+    "scene_of",
+    "sensor_message",
+    "write_metadata",
+    "write_session",
 ]  # fmt: skip

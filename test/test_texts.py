@@ -10,7 +10,8 @@ import pytest
 
 import boom_twin
 from boom_twin.texts import LANGUAGES, LIKELY, SENTENCES, THINGS, alarm_text, likelihood, translated, translations
-from boom_twin.types import SENSORS
+from boom_twin.twin.events import event_meaning
+from boom_twin.types import SENSORS, StrokeReading
 
 PAGE = Path(boom_twin.__file__).parent / "monitor" / "page"
 SIGNS = {"m", "p", "c", "t", "space", "boom twin", "CSV"}
@@ -85,3 +86,11 @@ def test_a_sentence_names_the_thing_and_ends_with_what_to_do(alarm: tuple[str, s
 def test_probabilities_in_words() -> None:
     assert [likelihood(least) for least, _ in LIKELY] == [words for _, words in LIKELY]
     assert translated("no such text", "de") == "no such text"
+
+
+def test_a_boom_that_angles_drive_is_told_of_its_angles() -> None:
+    assert alarm_text("joint_angles", "gap", None).startswith("Joint angles were missing. Check cable and driver of the angle")
+    assert alarm_text("cylinder_strokes", "gap", None).startswith("Cylinder lengths were missing. ")
+    assert event_meaning("gap", StrokeReading.ANGLE) == "longer pause between angles, bridged"
+    assert event_meaning("gap", StrokeReading.LENGTH) == "longer pause between strokes, bridged"
+    assert event_meaning("not used", StrokeReading.ANGLE).startswith("a stroke, though angles drive the model")

@@ -183,10 +183,7 @@ class EnergyBalance:
 
 
 def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
-    """Return the balance along a motion in steps of at most `dt` (s).
-
-    Where journals touch and part, each step is divided by `FINER`, so that powers in impacts can be summed.
-    """
+    """Return the balance along a motion in steps of at most `dt` (s), divided by `FINER` where journals touch and part."""
     energies, start = Energies(course.plan), course.start
     first, heavy = energies.total(start), energies.weight(start)
     course.work.load[:] = course.first_load
@@ -210,7 +207,6 @@ def tip_power(course: DriveCourse, state: State) -> Array:
 
 
 def states_of(course: DriveCourse, dt: float) -> Iterator[tuple[float, State]]:
-    """Steps (s) and states, as of `DriveCourse.states`, of a motion whose powers or forces are to be summed."""
     impacts = bool((course.plan.tables.clearances.linear == 0).any())
     return course.states(dt, FINER if impacts else 1)
 

@@ -62,10 +62,7 @@ def stations(scene: Scene) -> tuple[Station, ...]:
 
 
 def moments_by_unknowns(plan: Plan) -> Array:
-    """Bending moment (N m) at every station by the unknowns of the boom, shape (stations, unknowns).
-
-    Positive where it bends the outboard end up.
-    """
+    """Return bending moments (N m) at the stations by the unknowns, (stations, unknowns); positive: outboard end bent up."""
     tables = plan.tables
     found = np.zeros((len(PLACES) * len(tables.beams), len(plan.names)))
     for part, row in enumerate(tables.beams):
@@ -76,11 +73,7 @@ def moments_by_unknowns(plan: Plan) -> Array:
 
 
 def increments_by_tip_force(plan: Plan, state: State, work: Work) -> Array:
-    """Increments of the unknowns that a force at the tip causes at rest, by its x and y (N), shape (unknowns, 2).
-
-    By a sweep in which the force on the tip is minus the one that is applied; `state` is an equilibrium with its drives, and
-    stays.
-    """
+    """Return increments of the unknowns by x and y of a force at the tip (N) at rest, (unknowns, 2); `state` is kept."""
     t, still = plan.tables, np.zeros(plan.joints)
     place(t, state, work)
     motion, last = Motion(0.0, 0.0, work.position.copy(), np.zeros_like(work.position)), np.int64(len(t.operations))

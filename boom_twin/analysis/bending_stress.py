@@ -7,7 +7,6 @@ dynamic answer to it is left out. Stress is moment over section modulus, of bend
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +20,6 @@ from .bending_moments import Station, increments_by_tip_force, moments_by_unknow
 from .cylinder_drives import drives_as_read
 from .equilibrium import settle
 
-BOX = 2.4  # height over radius of gyration of a thin-walled box, for sections whose height is not given
 POSTURE_STEP = 0.03  # m of stroke after which the influence of the tip's force is made anew
 
 
@@ -43,10 +41,8 @@ def section_moduli(scene: Scene, heights: Array | None = None) -> Array:
     found = np.full(len(scene.sections), np.nan)
     for i, section in enumerate(scene.sections):
         if scene.is_flexible(i):
-            assert section.I is not None and section.A is not None
-            box = BOX * math.sqrt(section.I / section.A)
-            height = heights[i] if heights is not None else section.height or box
-            found[i] = 2.0 * section.I / height
+            assert section.I is not None
+            found[i] = 2.0 * section.I / (section.depth if heights is None else heights[i])
     return found
 
 

@@ -1,9 +1,8 @@
 """Reasons to doubt a result: estimated errors of a simulated motion, ringing, deflections beyond the model's validity.
 
 While stepping, the changes of the tip's acceleration give the error of its place (`step_error_warning`). The same motion run
-again gives errors of acceleration and forces too: a finer step shows what stepping adds, every second row of the drive shows
-what the curve between the rows adds (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 1993, section
-II.4). The step is halved. With clearance it is divided by eight, because a journal swings at some hundred Hz to some kHz.
+again gives errors of acceleration and forces too: a finer step shows what stepping adds, every second row of the drive what
+the curve between the rows adds (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 1993, section II.4).
 """
 
 from __future__ import annotations
@@ -17,11 +16,10 @@ from numpy.typing import NDArray
 
 from ..config.settings import STROKE_RATE
 from ..errors import UsageError
-from ..kernels.elements.linkage import cylinder_length
 from ..kernels.result_row import Results
 from ..kernels.tables import OK
 from ..scene.checks.geometry import LEVER, TRANSMISSION_DEG
-from ..scene.kinematics import RANGE_SAMPLES, joint_angles_of_strokes, linkage, skeleton, transmission_angles
+from ..scene.kinematics import RANGE_SAMPLES, joint_angles_of_strokes, joint_curve, linkage, skeleton
 from ..scene.schema import Scene
 from ..types import Array
 from .drive import DriveCourse, Run
@@ -50,9 +48,8 @@ class EstimatedError:
 def step_error_warning(jolt: float, shake: float, travel: float, square: float) -> str:
     """Return a warning with its remedy, or nothing.
 
-    One step of a second-order scheme errs by about h^2/12 |a' - a|. `jolt` and `shake` are the sums over all steps of
-    h^2 |a' - a| and of h^2 |a'| (m), see `kernels.transfer.time_step.run`. `travel` is how far the tip got from where it
-    started (m), `square` the sum over all steps of h^2 (s^2).
+    One step of a second-order scheme errs by about h^2/12 |a' - a|. For `jolt`, `shake` (m) see
+    `kernels.transfer.time_step.run`; `travel` is how far the tip got (m), `square` the sum over all steps of h^2 (s^2).
     """
     share = jolt / 12.0 / max(travel, SHORTEST_PATH)
     for sentence in ringing(jolt, shake, square):
@@ -101,7 +98,7 @@ def step_errors(course: DriveCourse, own: Run, dt: float) -> tuple[EstimatedErro
 def row_errors(course: DriveCourse, own: Run) -> tuple[EstimatedError, ...]:
     """Return the errors of the curve between the rows of the motion `own`; nothing for less than three rows.
 
-    Rows are left out in both ways, the odd ones and the even ones, because a kink shows in one of them only.
+    Odd and even rows are left out in turn, because a kink shows in one way only.
     """
     last = len(course.times) - 1
     if last < 2:
@@ -172,11 +169,9 @@ def joint_doubts(scene: Scene, times: Array, joints: Array) -> Iterator[str]:
                 f"joint_{i + 1} is at {math.degrees(angles[row]):.4g} deg at t = {times[row]:g} s, outside its range_deg "
                 f"{joint.range_deg[0]:g} to {joint.range_deg[1]:g}; give strokes that keep it inside"
             )
-        row_of, degrees = linkage(scene, i), np.linspace(*joint.range_deg, RANGE_SAMPLES)
-        with np.errstate(invalid="ignore"):
-            largest = float(np.nanmax(np.abs(cylinder_length(row_of, np.radians(degrees))[1])))
-            levers = np.abs(cylinder_length(row_of, angles)[1])
-        between = np.full(len(angles), 90.0) if i == 0 else np.degrees(transmission_angles(row_of, angles))
+        own = linkage(scene, i)
+        largest = float(np.nanmax(joint_curve(own, np.radians(np.linspace(*joint.range_deg, RANGE_SAMPLES))).levers))
+        _, levers, between = joint_curve(own, angles)
         if np.nanmin(between) < TRANSMISSION_DEG:
             row = int(np.nanargmin(between))
             yield (
@@ -206,10 +201,7 @@ def beyond_validity(scene: Scene, away: float) -> tuple[str, ...]:
 
 
 def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Array | None) -> tuple[str, ...]:
-    """Return the warning of `beyond_validity` for the worst of some instants of a motion.
-
-    `strokes` (m, n) and `tip` (m, 2) are in m. `angles` (n,) is a guess of the first joint angles, rad.
-    """
+    """Return the warning of `beyond_validity` for the worst of some instants of `strokes` (m, n) and `tip` (m, 2), m."""
     rows: NDArray[np.int64] = np.linspace(0, len(tip) - 1, CHECKED_INSTANTS).astype(np.int64)
     rows = np.unique(np.append(rows, np.argmax(np.hypot(*(tip - tip[0]).T))))
     worst, near = 0.0, angles

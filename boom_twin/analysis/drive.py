@@ -25,11 +25,7 @@ from ..types import Array
 
 
 def pchip(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
-    """Return the interpolating curves and their derivatives at `at` (k,), both (k, n).
-
-    `x` (m,) are increasing abscissae, m >= 2, and `y` (m, n) the values there, one curve a column; `at` lies between x[0] and
-    x[-1].
-    """
+    """Return interpolating curves and derivatives at `at` (k,), both (k, n), of values `y` (m, n) at increasing `x` (m,)."""
     h = np.diff(x)[:, None]
     secant = np.diff(y, axis=0) / h
     slope = _slopes(h, secant)
@@ -65,33 +61,26 @@ PASSES = np.int64(20)
 
 
 class Run(NamedTuple):
-    """Simulated motion: status, last step reached (`row`), results at the rows, and sums over the steps.
-
-    passes : mean Newton passes per step. square : sum of h^2 over all steps, s^2. longest : longest step, s. rates : drive
-    rates at the rows, m/s. lost : number of lost contacts of each pin with clearance. end : state after the last row.
-    """
+    """Simulated motion: status, last step reached (`row`), results at the rows, and sums over the steps."""
 
     status: int
     row: int
     rows: Results
-    passes: float
+    passes: float  # mean of a step
     jolt: float
     shake: float
-    square: float
-    longest: float
-    rates: Array
-    lost: NDArray[np.int64]
-    end: State
+    square: float  # sum of h^2 over all steps, s^2
+    longest: float  # longest step, s
+    rates: Array  # of the drives at the rows, m/s
+    lost: NDArray[np.int64]  # lost contacts of each pin with clearance
+    end: State  # after the last row
 
 
 NO_FORCE = np.zeros((0, 3))
 
 
 def force_at(force: Array, times: Array) -> Array:
-    """Return the force at the tip (N), shape (k, 2), at `times` (k,), s.
-
-    `force` has rows of time (s), x and y (N). They are joined as those of a drive are; before and behind them it is constant.
-    """
+    """Return the force at the tip (N), (k, 2), at `times` (k,); rows of `force` (time, x, y) are joined as those of a drive."""
     if len(force) < 2:
         return np.tile(force[:, 1:] if len(force) else np.zeros(2), (len(times), 1))
     found, _ = pchip(force[:, 0], force[:, 1:], np.clip(times, force[0, 0], force[-1, 0]))
@@ -158,10 +147,7 @@ class DriveCourse:
     def _drive(
         self, times: Array, strokes: Array, dt: float, finer: int
     ) -> tuple[Array, NDArray[np.int64], Array, Array, Array]:
-        """Return step size and count before every row but the first; drive lengths, rates and tip forces after each step.
-
-        Without a force, the last have no rows.
-        """
+        """Return step size and count before every row but the first; drives, rates and tip forces after each step."""
         spans = np.diff(times)
         counts = finer * np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
         if len(spans) == 0:

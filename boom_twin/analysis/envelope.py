@@ -55,9 +55,8 @@ class Envelope:
 def envelope(scene: Scene, progress: Callable[[int, int], None] = lambda done, total: None) -> Envelope:
     """Return the boom at rest in its named postures, on a grid over the ranges of its joints, and at the extremes.
 
-    `progress` is given how many of how many postures are done, and then how many extremes are searched. Postures out of a
-    cylinder's travel, or without an equilibrium, are left out and counted. There is no ground, and sections may cross each
-    other. SolverError if there is no posture with an equilibrium.
+    Postures out of a cylinder's travel, or without an equilibrium, are left out and counted. There is no ground, and sections
+    may cross each other. SolverError if there is no posture with an equilibrium.
     """
     postures = [(name, posture_angles(scene, name)) for name in scene.postures] + [("", angles) for angles in _grid(scene)]
     boom = _Boom(scene)
@@ -141,5 +140,4 @@ class _Boom:
 
 
 def _largest(values: Array, owners: Array, count: int) -> Array:
-    """Return the value of largest size of every owner, 0 where there is none."""
     return np.array([max(values[owners == owner], key=abs, default=0.0) for owner in range(count)])

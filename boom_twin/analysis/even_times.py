@@ -22,27 +22,10 @@ def spacing(times: Array) -> float:
 
 
 def power_density(values: Array, interval: float, segment: int) -> tuple[Array, Array, int]:
-    """Return a one-sided power spectral density by Welch's method: Hann window, half overlap, means removed.
+    """Return frequencies (lines,), one-sided power spectral density (lines,) or (lines, c) per Hz, and number of segments.
 
-    ``scipy.signal.welch`` gives the same, but takes half a second to import.
-
-    Parameters
-    ----------
-    values : ndarray, shape (k,) or (k, c)
-        At even times.
-    interval : float
-        Between two values, s.
-    segment : int
-        Values in a segment.
-
-    Returns
-    -------
-    frequencies : ndarray, shape (lines,)
-        Hz, from 0.
-    power : ndarray, shape (lines,) or (lines, c)
-        Square of the unit of `values`, per Hz.
-    count : int
-        Segments.
+    Welch's method: Hann window, half overlap, means removed, `segment` values a segment of `values` (k,) or (k, c) at even
+    times, `interval` s apart. ``scipy.signal.welch`` gives the same, but takes half a second to import.
     """
     parts = np.lib.stride_tricks.sliding_window_view(values, segment, axis=0)[:: segment - segment // 2]
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(segment) / segment)

@@ -93,8 +93,8 @@ def with_oil_at_rest(plan: Plan, drives: Array, stretches: Array) -> tuple[Table
     """Return tables whose cylinders keep the oil's compliance at rest, and gains and lags (s) of the drives, both (n,).
 
     A drive on its way changes the stiffness k(s) of its oil, too. The force k(s) (l - s) + d (l' - s') therefore changes by
-    -(k - k' (l - s)) ds - d ds'; with k kept it would by -k ds - d ds'. The gain is their ratio 1 - k' (l - s) / k, which is 1
-    without `oil`, and the lag is d / k. `drives` and `stretches` l - s (m), both (n,), are those at rest.
+    -(k - k' (l - s)) ds - d ds'; with k kept it would by -k ds - d ds'. The gain is their ratio 1 - k' (l - s) / k, which is
+    1 without `oil`, and the lag is d / k. `drives` and `stretches` l - s (m), both (n,), are those at rest.
     """
     rows, step = plan.tables.cylinders.copy(), 1e-6
     rows.compliance, rows.lag = plan.compliances_and_lags(drives)
@@ -121,10 +121,9 @@ def with_all_shapes(scene: Scene) -> Scene:
 
 
 def pins_at_rest(plan: Plan, state: State, work: Work) -> Array:
-    """Return forces and tangents of pins with clearance at rest, and the tangents' derivative by the rate s of motion, stacked.
+    """Return forces and tangents of pins with clearance at rest, and their derivative by the rate s of motion, stacked.
 
-    Both are of shape (pins, columns), see `Work.hold`. `work` has the state's positions. UsageError if a pin does not answer in
-    proportion: it has friction, hangs free in its bush, or is a spring whose place turns.
+    Each is (pins, columns), see `Work.hold`. UsageError if a pin does not answer in proportion.
     """
     for name, row, memory in zip(plan.pins, plan.tables.clearances, state.contacts, strict=True):
         if row.linear:
@@ -150,10 +149,9 @@ def pins_at_rest(plan: Plan, state: State, work: Work) -> Array:
 
 
 class LinearisedBoom:
-    """A boom at rest, for harmonic loads small enough that it answers in proportion.
+    """A boom at rest at absolute `strokes` (m), next to the joint `angles` (rad), both (n,), for harmonic loads.
 
-    It rests at absolute `strokes` (m) next to the joint `angles` (rad) of the undeformed boom, both (n,). SolverError if
-    there is no equilibrium, UsageError for a pin with clearance that does not answer in proportion, see `pins_at_rest`.
+    SolverError if there is no equilibrium, UsageError for a pin that does not answer in proportion, see `pins_at_rest`.
     """
 
     def __init__(self, scene: Scene, strokes: Array, angles: Array) -> None:

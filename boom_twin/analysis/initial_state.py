@@ -131,9 +131,8 @@ def started(
 ) -> tuple[Plan, State, Work]:
     """Compile a scene and set it in motion; the curve through the drives' first rows (s, m) gives length and rate at the start.
 
-    `load` is the force at the tip then, x and y, N.
-
-    UsageError for coordinates of another boom, or that leave loops open; SolverError if no accelerations balance the forces.
+    `load` is the force at the tip then, N. UsageError for coordinates of another boom, or that leave loops open; SolverError
+    if no accelerations balance the forces.
     """
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()

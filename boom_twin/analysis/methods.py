@@ -86,9 +86,8 @@ def integrate_with(
 ) -> MethodRun:
     """Integrate a drive in equal steps from static equilibrium at t = 0; a failed step sets `status`.
 
-    `duration` and `step` are in s, with a row after every `every` steps; `angles` (n,) are joint angles (rad) near the
-    equilibrium. UsageError if the duration is no multiple of `every` steps, or for clearance or an elastic base with the plain
-    product; SolverError if there is no equilibrium.
+    A row follows every `every` steps. `angles` (n,) are joint angles (rad) near the equilibrium. UsageError if the duration
+    is no multiple of `every` steps, or for what the plain product does not know; SolverError if there is no equilibrium.
     """
     method, rows = method or Method(), _row_count(duration, step, every)
     plan = compile_scene(scene, basis)

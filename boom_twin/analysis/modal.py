@@ -73,10 +73,9 @@ class _AtRest:
             low = omega * (1.0 - 1e-9)
 
     def response(self, omega: float, load: Array) -> Array:
-        """Solve (K - omega^2 M) dz = M load, up to a factor.
+        """Solve (K - omega^2 M) dz = M load, up to a factor: half the difference of two small loads.
 
-        This is half the difference of two small loads. K depends on forces, so a large load would change it. The residual
-        of the state cancels.
+        K depends on forces, so a large load would change it. The residual of the state cancels.
         """
         found = np.zeros_like(self._boom[1].z)
         inertia_response(*self._boom, omega, load, LOAD, self._hat, found)

@@ -60,9 +60,8 @@ class SampledMotions:
 def drawn(scene: Scene, deviations: Mapping[str, float], count: int, seed: int) -> dict[str, Array]:
     """Return random values (count,) of parameters about those of `scene`, independent of each other.
 
-    Shares give a log-normal distribution, so that stiffness and mass stay positive; loads a normal one, cut off at nothing.
-    `deviations` are standard deviations by the parameters' names (`boom_twin.scene.edit`): shares, of loads kg and kg/m.
-    UsageError for none at all, a parameter that the scene lacks, or a deviation that is not positive.
+    `deviations` by name: of loads in kg and kg/m, normal, cut off at nothing; of all others shares, log-normal, so that
+    stiffness and mass stay positive. UsageError for none, one that the scene lacks, or a deviation that is not positive.
     """
     names = parameter_names(scene)
     if not deviations:
@@ -95,10 +94,9 @@ def simulate_samples(
 ) -> SampledMotions:
     """Follow the strokes with `count` booms (2 at least) that differ in parameters drawn at random, on all cores.
 
-    `scene`, `times`, `strokes`, `dt`, `angles` and `force` are as for `boom_twin.simulate`, and every boom begins at rest; for
-    `deviations` see `drawn`. The same `seed` gives the same samples, whatever the number of cores. `tell` is called with 1
-    whenever a sample is done. UsageError as `drawn` and `boom_twin.simulate` raise it, and for motions that take too much
-    memory. SolverError if fewer than two samples could be computed.
+    The boom's arguments are as for `boom_twin.simulate`, from rest; for `deviations` and errors see `drawn`. The same `seed`
+    gives the same samples, whatever the number of cores. `tell` is called with 1 whenever a sample is done. SolverError if
+    fewer than two could be computed.
     """
     scene = as_scene(scene)
     if count < 2:
@@ -138,7 +136,6 @@ def simulate_samples(
 
 
 def _kept(found: Simulation) -> dict[str, Array]:
-    """Copies of what is told of a motion."""
     columns = found.columns()
     names = [name for name in columns if name.startswith(("tip_", "cylinder_force_"))]
     return {name: columns[name].copy() for name in names}

@@ -65,9 +65,8 @@ class ResonanceMap:
 def resonance_map(
     scene: Scene, postures: Mapping[str, Array], rates: Array, load_at: Callable[[float], PeriodicLoad]
 ) -> ResonanceMap:
-    """Return the swing of the tip in the steady state of every posture under the load at every rate (Hz).
+    """Return the swing of the tip in the steady state of every posture (joint angles, rad, by name) at every rate (Hz).
 
-    `postures` are joint angles (rad), shape (n,), of the undeformed boom, by name; `load_at` gives the load at a rate.
     UsageError for a posture out of the cylinders' travel, SolverError for one without a stable equilibrium.
     """
     loads = [load_at(float(rate)) for rate in rates]

@@ -41,7 +41,7 @@ class PeriodicLoad:
 
 
 def pump_load(scene: Scene, frequency: float, height: float, change_over: float = CHANGE_OVER) -> PeriodicLoad:
-    """Return vertical pump pulses of `frequency` (Hz) and `height` (N): on for half of a period, flanks of `change_over` (s).
+    """Return vertical pump pulses of `frequency` (Hz) and `height` (N), on for half of a period, see `pump_pulses`.
 
     UsageError for a number that is not positive, or flanks that take longer than half a period.
     """
@@ -61,8 +61,8 @@ def pump_load(scene: Scene, frequency: float, height: float, change_over: float 
 def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
     """Return a load that goes straight from row to row, with harmonics up to `HIGHEST_HARMONIC`.
 
-    `times` (m,), s, increase; `forces` (m, 2) are in x and y, N. The last row ends the period with the force of the first.
-    UsageError for fewer than three rows, values that are not finite, times that do not increase, or ends that differ.
+    `times` (m,), s, increase; `forces` (m, 2), N. The last row ends the period with the force of the first. UsageError
+    otherwise.
     """
     if len(times) < 3:
         raise UsageError("load: give at least three rows of finite numbers t_s,fx_N,fy_N, one period of the force.")
@@ -156,10 +156,7 @@ def swing_of(path: Array) -> float:
 
 
 def steady_state(scene: Scene, load: PeriodicLoad, strokes: Array | None = None, posture: str | None = None) -> SteadyState:
-    """Return the motion under a periodic load at the tip, when all that began with it has died away.
-
-    The boom rests at absolute `strokes` (m) or in a `posture`, as for `statics`, whose errors this raises too.
-    """
+    """Return the motion under a periodic load when all that began with it has died away; for the rest see `statics`."""
     return steady_state_of(linearised_boom(scene, strokes, posture), load)
 
 

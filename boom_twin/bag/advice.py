@@ -54,11 +54,6 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
 
     Parameters
     ----------
-    info : BagInfo
-    topics : Topics
-        Names of its topics and sensors.
-    joints : int
-        Number of joints of the scene.
     scene : str
         Source of the scene, named in the sentences.
     """

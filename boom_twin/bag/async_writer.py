@@ -26,13 +26,11 @@ class Syncer:
         The mark of the newest request that is on the disk.
     time : float
         Time of that request, s of `time.monotonic`.
-    error : OSError or None
-        Error of the disk, if it failed.
     """
 
     def __init__(self) -> None:
         self.done, self.time = 0, time.monotonic()
-        self.error: OSError | None = None
+        self.error: OSError | None = None  # error of the disk, if it failed
         self._sent = self._answered = 0  # requests; each is changed by one thread only
         self._began = self.time
         self._requests: SimpleQueue[tuple[int, int, float]] = SimpleQueue()
@@ -77,15 +75,11 @@ class Syncer:
 
 FLUSH = 0.25
 """Time between two flushes, s. A killed process loses at most the messages of that time."""
-STALL = 5.0
-"""Time without an answer of the disk before it is reported, s."""
-PATIENCE = 30.0
-"""Time for the disk to complete the bag at the end, s."""
-MOST_WAITING = 256 * 2**20
-"""Bytes of messages that may wait in memory."""
+STALL = 5.0  # time without an answer of the disk before it is reported, s
+PATIENCE = 30.0  # time for the disk to complete the bag at the end, s
+MOST_WAITING = 256 * 2**20  # bytes of messages that may wait in memory
 
-MOST_FILES = 2000
-"""Limit for the number of files of one recording: readers refuse a ``metadata.yaml`` of about 3000 files."""
+MOST_FILES = 2000  # limit for the number of files of one recording: readers refuse a ``metadata.yaml`` of about 3000 files
 
 _Message = tuple[int, int, bytes, int, int]
 
@@ -115,7 +109,6 @@ class Storage:
     ----------
     bag : BagWriter
         Used by this object only from now on.
-    split : FileSplit
     tell : callable
         Receives a sentence when the disk does not answer, when it answers again, and when no further file begins.
     """

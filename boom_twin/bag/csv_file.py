@@ -30,8 +30,7 @@ TIME = "t_s"
 _NUMBERED = re.compile(r"(?:stroke_(\d{1,3})_m|joint_(\d{1,3})_rad|cylinder_force_(\d{1,3})_N)")
 ROWS_TO_JUDGE, SLOWEST_STEP, FASTEST_STEP = 20, 1.0, 1e-4  # rows; s from row to row, by which the unit of the times is known
 UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
-NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
-"""Channel number of every stream."""
+NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}  # channel number of every stream
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,9 +86,7 @@ def _samples(path: Path) -> Iterator[Sample]:
             for stream, names in columns.items()
             if any(name in piece.names for name in names)
         }
-        strokes, angles, imu, forces = (values.get(stream) for stream in columns)
-        shifted = np.array(stamps, np.int64) + shift
-        yield from samples_of(shifted, strokes, angles, imu, forces=forces)
+        yield from samples_of(np.array(stamps, np.int64) + shift, values)
 
 
 def _columns_of(table: CsvTable) -> dict[Stream, list[str]]:

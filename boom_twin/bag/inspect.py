@@ -17,8 +17,7 @@ from .reader import Session, scan
 from .session_file import CDR, SessionFile, as_bag_error, schema_of
 from .time_window import WHOLE, TimeWindow
 
-VARIANTS = 100
-"""Largest number of different name lists counted in one topic."""
+VARIANTS = 100  # largest number of different name lists counted in one topic
 
 
 class Skew(NamedTuple):
@@ -34,37 +33,20 @@ class Tally:
     """Statistics of one topic.
 
     Steps are between stamps; without a header, between log times. A stamp of 0 is left out.
-
-    Attributes
-    ----------
-    name, type : str
-    stamped, named : bool
-        True for messages with a header; True for joint states.
-    count : int
-    first, last : int
-        Log times, ns.
-    gap, gap_after : int
-        Largest step between two stamps; log time of the message before it; ns.
-    not_increasing : int
-        Number of messages whose stamp is not after that of the message before.
-    unset : int
-        Number of messages with a stamp of 0 or too short for a stamp.
-    names : Counter
-        Number of messages by their joint names.
     """
 
     name: str
     type: str
-    stamped: bool
+    stamped: bool  # stamped, named: true for messages with a header; True for joint states
     named: bool
     count: int = 0
-    first: int = 0
+    first: int = 0  # first, last: log times, ns
     last: int = 0
-    gap: int = 0
+    gap: int = 0  # gap, gap_after: largest step between two stamps; log time of the message before it; ns
     gap_after: int = 0
-    not_increasing: int = 0
-    unset: int = 0
-    names: Counter[tuple[str, ...]] = field(default_factory=Counter)
+    not_increasing: int = 0  # number of messages whose stamp is not after that of the message before
+    unset: int = 0  # number of messages with a stamp of 0 or too short for a stamp
+    names: Counter[tuple[str, ...]] = field(default_factory=Counter)  # number of messages by their joint names
     _skewed: int = 0  # messages whose log time is compared with their stamp
     _skew_least: int = 0
     _skew_most: int = 0
@@ -135,29 +117,14 @@ _NAMED = TYPES[Stream.STROKES]
 
 @dataclass(frozen=True, slots=True)
 class BagInfo:
-    """Statistics of a session and of its topics.
-
-    Attributes
-    ----------
-    session : Session
-    tallies : tuple of Tally
-        Sorted by the name of the topic.
-    library : str
-        Program that wrote the first file, by its own name.
-    compression : str
-        Compression of the chunks: ``zstd``, ``lz4``, ``none``, ..; or a note that the file has no chunks.
-    size : int
-        Size of all files, bytes.
-    window : TimeWindow
-        Part of the session that the tallies count.
-    """
+    """Statistics of a session and of its topics."""
 
     session: Session
-    tallies: tuple[Tally, ...]
-    library: str
-    compression: str
-    size: int
-    window: TimeWindow = WHOLE
+    tallies: tuple[Tally, ...]  # sorted by the name of the topic
+    library: str  # program that wrote the first file, by its own name
+    compression: str  # compression of the chunks: ``zstd``, ``lz4``, ``none``, ..; or a note that the file has no chunks
+    size: int  # size of all files, bytes
+    window: TimeWindow = WHOLE  # part of the session that the tallies count
 
     @property
     def span(self) -> tuple[int, int]:

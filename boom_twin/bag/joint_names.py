@@ -10,12 +10,10 @@ from ..messages.topic_table import Topics
 from ..types import SENSORS, Stream
 from .reader import Session, read
 
-NAMING_TIME = 5_000_000_000
-"""Log time (ns) from the first message of strokes or angles, in which all names are read."""
+NAMING_TIME = 5_000_000_000  # log time (ns) from the first message of strokes or angles, in which all names are read
 
 KINDS = {stream: kind.named for stream, kind in SENSORS.items() if kind.is_named and not kind.ends}
-NAMES_TOLD = 12
-"""Limit for the number of names in a sentence."""
+NAMES_TOLD = 12  # limit for the number of names in a sentence
 
 
 def refuse_other_names(session: Session, topics: Topics, joints: int, scene: str = "") -> None:
@@ -23,11 +21,6 @@ def refuse_other_names(session: Session, topics: Topics, joints: int, scene: str
 
     Parameters
     ----------
-    session : Session
-    topics : Topics
-        Names of its topics and sensors.
-    joints : int
-        Number of joints of the scene.
     scene : str
         Source of the scene; empty if unknown.
     """

@@ -15,8 +15,7 @@ Piece = tuple[Integers, Integers, NDArray[np.uint64]]
 """Places, channels and log times (ns) of many messages in the order of the file."""
 OUT_OF_ORDER = 0.25
 """Share of steps back among a file's messages at which its order is not that of recording; a random order has half."""
-MAJORITY = 0.5
-"""Share of messages in topics that step back at which the clock is the cause, because all topics share the clock."""
+MAJORITY = 0.5  # share of messages in topics that step back at which the clock is the cause, because all topics share the clock
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,17 +25,10 @@ class LogClock:
     A recorder writes a topic's messages as they come. If the log times of a topic step back and continue from there, the
     clock was set back. If they step back often, or for one message, the file was not written in order, and its log times
     are sound.
-
-    Attributes
-    ----------
-    places : ndarray of int64, shape (k,)
-        Place of the first message after every step.
-    shifts : ndarray of int64, shape (k,)
-        Total shift of the clock after every step, ns.
     """
 
-    places: Integers
-    shifts: Integers
+    places: Integers  # place of the first message after every step; shape (k,)
+    shifts: Integers  # total shift of the clock after every step, ns; shape (k,)
 
     @property
     def is_set_back(self) -> bool:

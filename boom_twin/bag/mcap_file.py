@@ -39,34 +39,23 @@ from .mcap_records import (
 from .session_file import PARSE_ERRORS, SessionFile, as_bag_error
 
 PROFILE = "ros2"
-NOTES = "boom_twin"
-"""Name of the metadata record that holds the notes on a session."""
+NOTES = "boom_twin"  # name of the metadata record that holds the notes on a session
 
-_RUN = 2**20
-"""Size of a piece of messages outside chunks, bytes."""
-_CRC = PREFIX.size + 24
-"""Offset of the checksum in the record of a chunk."""
-_CHUNK_HEAD = _CRC + 4 + 4 + 8
-"""Bytes of the record of a chunk beside the name of its compression and its packed content."""
-_LENGTH = 8
-"""Size of the length field right before the body of a record, bytes."""
+_RUN = 2**20  # size of a piece of messages outside chunks, bytes
+_CRC = PREFIX.size + 24  # offset of the checksum in the record of a chunk
+_CHUNK_HEAD = _CRC + 4 + 4 + 8  # bytes of the record of a chunk beside the name of its compression and its packed content
+_LENGTH = 8  # size of the length field right before the body of a record, bytes
 _HEAD = np.dtype([("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
 """`MESSAGE_HEAD` behind the length of its record."""
 _MESSAGE = int(Opcode.MESSAGE)
-_PIECE = 2**31
-"""Offset between the places of messages of two pieces: more than the bytes of a piece."""
+_PIECE = 2**31  # offset between the places of messages of two pieces: more than the bytes of a piece
 
 
 @dataclass(frozen=True, slots=True)
 class McapFile(SessionFile):
-    """Content of one .mcap file.
+    """Content of one .mcap file."""
 
-    Attributes
-    ----------
-    pieces : list of ChunkIndex
-        Chunks, and runs of messages outside chunks, in the order of the file.
-    """
-
+    # chunks, and runs of messages outside chunks, in the order of the file
     pieces: list[ChunkIndex] = field(default_factory=list)
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:

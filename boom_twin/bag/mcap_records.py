@@ -22,21 +22,15 @@ from ..errors import BagError
 from ..system.received_files import open_received
 from .session_file import REMEDY
 
-LARGEST_SUMMARY = 64 * 2**20
-"""Size limit of one record of a summary, and of all definitions together, bytes."""
-MOST_HELD = 2**30
-"""Size limit of one message or one unpacked chunk in memory, bytes."""
+LARGEST_SUMMARY = 64 * 2**20  # size limit of one record of a summary, and of all definitions together, bytes
+MOST_HELD = 2**30  # size limit of one message or one unpacked chunk in memory, bytes
 MOST_TOGETHER = 2**22
 """Limit of messages in memory. An empty message takes ten times its bytes there."""
-BLOCK = 2**20
-"""Number of bytes read at a time from a file of any size."""
+BLOCK = 2**20  # number of bytes read at a time from a file of any size
 
-PREFIX = struct.Struct("<BQ")
-"""Opcode and length of a record."""
-MESSAGE_HEAD = struct.Struct("<HIQQ")
-"""Channel, sequence, log time (ns), publish time (ns) of a message."""
-FOOTER = struct.Struct("<BQQQI8s")
-"""Last record of a file and the magic after it."""
+PREFIX = struct.Struct("<BQ")  # opcode and length of a record
+MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time (ns), publish time (ns) of a message
+FOOTER = struct.Struct("<BQQQI8s")  # last record of a file and the magic after it
 KINDS: dict[int, Any] = {
     int(opcode): getattr(mcap_records, opcode.name.title().replace("_", ""))
     for opcode in Opcode

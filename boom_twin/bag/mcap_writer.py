@@ -40,8 +40,7 @@ Pack = Callable[[bytearray], bytes]
 
 _INDEX_HEAD = struct.Struct("<HI")  # index of one channel in one chunk: channel, bytes of entries
 _INDEX_ENTRY = struct.Struct("<QQ")  # log time (ns), place in the chunk
-_HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")
-"""Array type of `PREFIX` and `MESSAGE_HEAD`."""
+_HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")  # array type of `PREFIX` and `MESSAGE_HEAD`
 
 
 class McapWriter:
@@ -51,12 +50,8 @@ class McapWriter:
     ----------
     stream : BinaryIO
         Empty stream. Nothing else may write to it. It is not closed.
-    profile, library : str
-        Fields of the file's header.
     chunk_size : int
         Size above which a chunk is complete, bytes of records.
-    compression : CompressionType
-        Compression of the chunks.
 
     Raises
     ------
@@ -215,18 +210,14 @@ class _OpenChunk:
 
     Attributes
     ----------
-    content : bytearray
-        The records.
     entries : dict of int to list of bytes
         Index entries (log time and place of every message) by channel, in the order of their first messages.
-    start, end : int
-        First and last log time, ns.
     """
 
     def __init__(self) -> None:
-        self.content = bytearray()
+        self.content = bytearray()  # the records
         self.entries: dict[int, list[bytes]] = {}
-        self.start = self.end = 0
+        self.start = self.end = 0  # first and last log time, ns
 
     def add(self, channel: int, log_time: int, record: bytes) -> None:
         """Append one message."""

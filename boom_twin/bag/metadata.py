@@ -20,11 +20,9 @@ from ..messages.topic_table import Qos
 from ..system.atomic_files import write_atomic
 
 FILE_NAME = "metadata.yaml"
-VERSION = 9
-"""Version of the format that Jazzy writes."""
+VERSION = 9  # version of the format that Jazzy writes
 
-STORAGES = {".mcap": "mcap", ".db3": "sqlite3"}
-"""Storages of rosbag2 that are read, by the suffix of their files."""
+STORAGES = {".mcap": "mcap", ".db3": "sqlite3"}  # storages of rosbag2 that are read, by the suffix of their files
 _ROOT = "rosbag2_bagfile_information"
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
@@ -184,8 +182,7 @@ def offered_qos(qos: Qos) -> list[dict[str, Any]]:
     ]
 
 
-DEEPEST = 10_000
-"""Limit for the depth of a QoS profile that is read."""
+DEEPEST = 10_000  # limit for the depth of a QoS profile that is read
 
 _RELIABILITY = {1: "reliable", 2: "best_effort", "reliable": "reliable", "best_effort": "best_effort"}
 _DURABILITY = {1: "transient_local", 2: "volatile", "transient_local": "transient_local", "volatile": "volatile"}
@@ -224,27 +221,13 @@ def _profile(entry: dict[Any, Any]) -> Qos | None:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """One topic in a bag.
+    """One topic in a bag."""
 
-    Attributes
-    ----------
-    topic, type : str
-        Absolute name, and type as ``package/msg/Name``.
-    definition : bytes
-        Definition of the type and all types in it, in the language `definition_encoding`.
-    details : dict of str to str
-        Metadata of the channel.
-    qos : object
-        Offered profiles, for ``metadata.yaml``.
-    type_hash : str
-    encoding, definition_encoding : str
-    """
-
-    topic: str
+    topic: str  # topic, type: absolute name, and type as ``package/msg/Name``
     type: str
-    definition: bytes
+    definition: bytes  # definition of the type and all types in it, in the language `definition_encoding`
     details: Mapping[str, str] = field(default_factory=dict)
-    qos: Any = ()
+    qos: Any = ()  # offered profiles, for ``metadata.yaml``
     type_hash: str = ""
     encoding: str = "cdr"
     definition_encoding: str = "ros2msg"

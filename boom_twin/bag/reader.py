@@ -19,7 +19,7 @@ from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 
 from ..errors import BagError
-from ..messages.type_store import jazzy
+from ..messages.type_store import other_than_jazzy
 from ..system.received_files import holds_file, sha256_of
 from ..types import NANO
 from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata, refuse_packed
@@ -100,10 +100,8 @@ def readable(file: SessionFile, asked: Mapping[str, str]) -> set[int]:
         if typed and not fitting:
             raise BagError(f"{place}: message encoding {typed[0].message_encoding!r}: only cdr is read. Use ROS 2.")
         for channel in fitting:
-            for name, (_, fields) in _parsed(place, file.schemas[channel.schema_id], kind).items():
-                known = jazzy().fielddefs.get(name)
-                if known is not None and list(known[1]) != list(fields):
-                    raise BagError(f"{place}: {name} is defined otherwise than in Jazzy. Convert the bag's messages.")
+            for name in other_than_jazzy(_parsed(place, file.schemas[channel.schema_id], kind)):
+                raise BagError(f"{place}: {name} is defined otherwise than in Jazzy. Convert the bag's messages.")
         found.update(each.id for each in fitting)
     return found
 
@@ -112,8 +110,7 @@ _PARSERS: dict[str, Callable[[str, str], Typesdict]] = {
     "ros2msg": get_types_from_msg,
     "ros2idl": lambda text, _: get_types_from_idl(text),
 }
-_SEPARATOR = re.compile(r"^={3,}[ \t]*$", re.MULTILINE)
-"""Line between definitions, for which rosbags requires 80 characters."""
+_SEPARATOR = re.compile(r"^={3,}[ \t]*$", re.MULTILINE)  # line between definitions, for which rosbags requires 80 characters
 
 
 def _parsed(place: str, schema: Schema, kind: str) -> Typesdict:
@@ -130,8 +127,7 @@ def _parsed(place: str, schema: Schema, kind: str) -> Typesdict:
         raise BagError(f"{place}: its definition cannot be parsed ({error}). Record the session again.") from error
 
 
-RECOVERED = "recovered from"
-"""Key of the note on a session that was recovered from a damaged one."""
+RECOVERED = "recovered from"  # key of the note on a session that was recovered from a damaged one
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,37 +141,19 @@ class TopicInfo:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Content of a session.
-
-    Attributes
-    ----------
-    path : Path
-        Path as given.
-    files : tuple of SessionFile
-    topics : tuple of TopicInfo
-        Topics, sorted by name.
-    start, end : int
-        First and last log time in nanoseconds; 0 without messages.
-    checked : bool
-        True if all its messages are under a checksum. Without (the default of ``ros2 bag record``), a flipped bit in
-        a value cannot be detected.
-    notes : dict of str to str
-        Notes of the writer, for instance that the session is synthetic.
-    metadata : BagMetadata or None
-        Content of ``metadata.yaml``; None without one.
-    incomplete : str
-        Reason why the session is not whole, if its folder says so; else empty.
-    """
+    """Content of a session."""
 
     path: Path
     files: tuple[SessionFile, ...]
-    topics: tuple[TopicInfo, ...]
-    start: int
+    topics: tuple[TopicInfo, ...]  # topics, sorted by name
+    start: int  # start, end: first and last log time in nanoseconds; 0 without messages
     end: int
+    # True if all its messages are under a checksum. Without (the default of ``ros2 bag record``), a flipped bit in a value
+    # cannot be detected
     checked: bool
-    notes: dict[str, str]
-    metadata: BagMetadata | None
-    incomplete: str
+    notes: dict[str, str]  # notes of the writer, for instance that the session is synthetic
+    metadata: BagMetadata | None  # content of ``metadata.yaml``; None without one
+    incomplete: str  # reason why the session is not whole, if its folder says so; else empty
 
     def find(self, name: str) -> TopicInfo | None:
         """Return a topic by its name, with or without its leading slash; None if it is missing."""
@@ -251,8 +229,6 @@ def read(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE
 
     Parameters
     ----------
-    session : Session
-        Result of `scan`.
     wanted : dict of str to str
         Message type by topic, with or without the leading slash.
     window : TimeWindow, optional
@@ -295,8 +271,7 @@ def read_blocks(session: Session, wanted: Mapping[str, str], window: TimeWindow 
     return SessionBlocks([(file, readable(file, types)) for file in session.files], asked, window)
 
 
-_AND = " and "
-"""Separator between the types of a topic that has several."""
+_AND = " and "  # separator between the types of a topic that has several
 
 
 def _topics(files: tuple[SessionFile, ...]) -> tuple[TopicInfo, ...]:

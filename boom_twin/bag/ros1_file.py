@@ -16,13 +16,12 @@ from rosbags.rosbag1.reader import decompressors
 from rosbags.typesys import TypesysError, get_types_from_msg
 
 from ..errors import BagError
-from ..messages.type_store import jazzy
+from ..messages.type_store import jazzy, other_than_jazzy
 from ..system.received_files import open_received
 from .mcap_records import MOST_HELD
 from .session_file import CDR, PARSE_ERRORS, SessionFile, channel_of, schema_of
 
-ENCODING = "ros1"
-"""Encoding of a message that is not converted, because its type differs in Jazzy."""
+ENCODING = "ros1"  # encoding of a message that is not converted, because its type differs in Jazzy
 _OWN = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 """Types that differ in ROS 2, and that `Typestore.ros1_to_cdr` converts."""
 _ERRORS = (ReaderError, AssertionError, EOFError, RecursionError, *PARSE_ERRORS)
@@ -61,15 +60,12 @@ def summarise(path: Path) -> Ros1File:
 
 def _encoding(connection: Connection) -> str:
     """Return `CDR` if the type is defined as in Jazzy, so that its messages can be converted; else `ENCODING`."""
-    known = jazzy().fielddefs
     try:
         found = get_types_from_msg(str(connection.msgdef.data), connection.msgtype)
     except TypesysError:
         return ENCODING
-    is_same = all(
-        name in known and list(known[name][1]) == list(fields) for name, (_, fields) in found.items() if name not in _OWN
-    )
-    return CDR if is_same else ENCODING
+    is_known = all(name in jazzy().fielddefs for name in found.keys() - set(_OWN))
+    return CDR if is_known and not {*other_than_jazzy(found)} - set(_OWN) else ENCODING
 
 
 def _compression(reader: Any) -> str:

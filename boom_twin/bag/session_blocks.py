@@ -39,11 +39,6 @@ class SessionBlocks:
     window : TimeWindow
         Time window; messages outside it are left out.
 
-    Attributes
-    ----------
-    sources : list of Source
-        Source for each source number of the blocks.
-
     Raises
     ------
     BagError
@@ -52,7 +47,7 @@ class SessionBlocks:
     """
 
     def __init__(self, files: Sequence[tuple[SessionFile, set[int]]], asked: Mapping[str, str], window: TimeWindow) -> None:
-        self.sources: list[Source] = []
+        self.sources: list[Source] = []  # source for each source number of the blocks
         self._window = window
         self._files = [(file, self._numbers(file, channels, asked)) for file, channels in files]
 

@@ -22,15 +22,13 @@ from ..messages.message_block import MessageBlock
 from ..messages.type_store import jazzy
 from .log_clock import NEVER_SET_BACK, LogClock
 
-TOGETHER = 2000
-"""Messages in one block of a file that is read message by message."""
+TOGETHER = 2000  # messages in one block of a file that is read message by message
 CDR = "cdr"
 REMEDY = "The file is damaged or was cut off: `boom_twin recover BAG --out DIR` saves what is whole."
 
 _LZ4 = (RuntimeError,)
 _PARSING = (struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError)
-PARSE_ERRORS = (McapError, SerdeError, ZstdError, *_LZ4, *_PARSING)
-"""Errors that the parsers raise on invalid bytes."""
+PARSE_ERRORS = (McapError, SerdeError, ZstdError, *_LZ4, *_PARSING)  # errors that the parsers raise on invalid bytes
 
 
 @contextmanager
@@ -61,36 +59,20 @@ def by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> Coun
 
 @dataclass(frozen=True, slots=True)
 class SessionFile(ABC):
-    """Content of one file of a session.
-
-    Attributes
-    ----------
-    path : Path
-    storage : str
-        Storage of the file: ``mcap``, ``sqlite3``, ``ros1`` or ``csv``.
-    library, compression : str
-        Program that wrote the file, by its own name; compression of its first chunk, or a note that it has no chunks.
-    channels : dict of int to Channel
-    schemas : dict of int to Schema
-    counts : dict of int to int
-        Number of messages by channel.
-    start, end : int
-        First and last log time in nanoseconds; 0 without messages.
-    checked : bool
-        True if its messages are under a checksum and counted. If not, a flipped bit can pass undetected.
-    notes : dict of str to str
-    """
+    """Content of one file of a session."""
 
     path: Path
-    storage: str
+    storage: str  # storage of the file: ``mcap``, ``sqlite3``, ``ros1`` or ``csv``
+    # library, compression: program that wrote the file, by its own name; compression of its first chunk, or a note that it has
+    # no chunks
     library: str
     compression: str
     channels: dict[int, Channel]
     schemas: dict[int, Schema]
-    counts: dict[int, int]
-    start: int
+    counts: dict[int, int]  # number of messages by channel
+    start: int  # start, end: first and last log time in nanoseconds; 0 without messages
     end: int
-    checked: bool = False
+    checked: bool = False  # True if its messages are under a checksum and counted. If not, a flipped bit can pass undetected
     notes: dict[str, str] = field(default_factory=dict)
 
     def check_counts(self, source: str, counts: Mapping[int, int], other: str, others: Mapping[int, int]) -> None:
@@ -135,6 +117,6 @@ def schema_of(number: int, type_name: str, definition: str = "") -> Schema:
     return Schema(id=number, name=type_name, encoding="ros2msg", data=definition.encode())
 
 
-def channel_of(number: int, topic: str, encoding: str = CDR, metadata: Mapping[str, str] | None = None) -> Channel:
+def channel_of(number: int, topic: str, encoding: str = CDR) -> Channel:
     """Return a channel whose schema has the number of the channel."""
-    return Channel(id=number, topic=topic, message_encoding=encoding, schema_id=number, metadata=dict(metadata or {}))
+    return Channel(id=number, topic=topic, message_encoding=encoding, schema_id=number, metadata={})

@@ -13,10 +13,9 @@ from ..errors import UsageError
 from ..messages.topic_table import FRAME, every_input
 from ..messages.type_store import fill_header, new_message
 from ..types import SENSORS, Array, Sample, Stream
-from .writer import SessionWriter
+from .writer import MessageWriter
 
-_UNKNOWN = -1.0
-"""First element of a covariance: the quantity is not measured (REP-145)."""
+_UNKNOWN = -1.0  # first element of a covariance: the quantity is not measured (REP-145)
 
 
 def write_session(
@@ -64,7 +63,7 @@ def write_session(
     values |= placed or {}
     there = {stream: rows for stream, rows in values.items() if rows is not None}
     _check_shapes(len(stamps_ns), strokes.shape[-1], there)
-    write_samples(directory, samples_of(stamps_ns, strokes, joints, imu, angle_stamps_ns, forces, placed), there, description)
+    write_samples(directory, samples_of(stamps_ns, there, angle_stamps_ns), there, description)
 
 
 def write_samples(
@@ -79,7 +78,7 @@ def write_samples(
         (SENSORS[sample.stream].beside, sample.stamp): sample.values for sample in samples if SENSORS[sample.stream].beside
     }
     topics = {stream.value: inputs[stream] for stream in streams if not SENSORS[stream].beside}
-    with SessionWriter(directory, topics, description) as bag:
+    with MessageWriter(directory, topics, description) as bag:
         for sample in samples:
             if sample.stream.value in topics:
                 bag.write(
@@ -88,31 +87,17 @@ def write_samples(
 
 
 def samples_of(
-    stamps_ns: NDArray[np.int64],
-    strokes: Array | None,
-    joints: Array | None,
-    imu: Array | None,
-    angle_stamps_ns: NDArray[np.int64] | None = None,
-    forces: Array | None = None,
-    placed: Mapping[Stream, Array] | None = None,
+    stamps_ns: NDArray[np.int64], values: Mapping[Stream, Array], angle_stamps_ns: NDArray[np.int64] | None = None
 ) -> list[Sample]:
-    """Return the samples of a session by stamp, strokes first at equal stamps, from arrays as in `write_session`.
+    """Return the samples of a session by stamp, from rows of readings; at equal stamps in the order of `values`.
 
     A row without any value gives no sample.
     """
-    angle_stamps = stamps_ns if angle_stamps_ns is None else angle_stamps_ns
-    streams: list[tuple[Stream, NDArray[np.int64], Array | None]] = [
-        (Stream.STROKES, stamps_ns, strokes),
-        (Stream.ANGLES, angle_stamps, joints),
-        (Stream.IMU, stamps_ns, imu),
-        (Stream.FORCES, stamps_ns, forces),
-        *((stream, stamps_ns, rows) for stream, rows in (placed or {}).items()),
-    ]
+    other = {} if angle_stamps_ns is None else {Stream.ANGLES: angle_stamps_ns}
     samples = [
         Sample(stream, stamp, row)
-        for stream, stamps, values in streams
-        if values is not None
-        for stamp, row in zip(stamps.tolist(), values, strict=True)
+        for stream, rows in values.items()
+        for stamp, row in zip(other.get(stream, stamps_ns).tolist(), rows, strict=True)
         if not np.isnan(row).all()
     ]
     return sorted(samples, key=lambda sample: sample.stamp)

@@ -23,29 +23,18 @@ from .session_sheet import KeptText, kept, kept_parameters, rig_version, sha256
 
 DEFAULT_MAPPING = "default mapping"
 DEFAULT_PARAMETERS = "default parameters"
-GIVEN = "given as a Scene"
-"""Source of a scene that came by no file."""
+GIVEN = "given as a Scene"  # source of a scene that came by no file
 LENGTHS_SINCE = 0, 2  # first version of the virtual rig whose transducers read lengths
 
 
 @dataclass(frozen=True)
 class SessionScene:
-    """A scene, its text, and the source of the text.
-
-    Attributes
-    ----------
-    scene : Scene
-    text : str
-    source : str
-        Path, place in a ``session.yaml``, or `DEFAULT_NAME`.
-    oddities : tuple of Fault
-        Values that can be computed but are implausible.
-    """
+    """A scene, its text, and the source of the text."""
 
     scene: Scene
     text: str
-    source: str
-    oddities: tuple[Fault, ...] = ()
+    source: str  # path, place in a ``session.yaml``, or `DEFAULT_NAME`
+    oddities: tuple[Fault, ...] = ()  # values that can be computed but are implausible
 
     @property
     def sha256(self) -> str:
@@ -61,26 +50,21 @@ class Mapped:
     source: str
 
 
-def scene_from(source: str | Path | None) -> SessionScene:
-    """Return the scene of a file, or that of the package if no file is given; see `boom_twin.load_scene`."""
+def scene_from(source: SceneSource | SessionScene) -> SessionScene:
+    """Return a scene with its text, from a file or a program, or that of the package for None; see `boom_twin.load_scene`."""
+    if isinstance(source, SessionScene):
+        return source
+    if source is not None and not isinstance(source, str | Path):
+        scene = as_scene(source)
+        return SessionScene(scene, anew(scene), GIVEN)
     name = DEFAULT_NAME if source is None else str(source)
     text = default_text() if source is None else read_text(Path(source))
     scene, oddities = examine_text(text, name)
     return SessionScene(scene, text, name, tuple(oddities))
 
 
-def given_scene(source: SceneSource | SessionScene) -> SessionScene:
-    """Return a scene that is given by a program or a file, or that of the package for None, with its text."""
-    if isinstance(source, SessionScene):
-        return source
-    if source is None or isinstance(source, str | Path):
-        return scene_from(source)
-    scene = as_scene(source)
-    return SessionScene(scene, anew(scene), GIVEN)
-
-
-def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:
-    """Return the scene of a session: from the file `given`, else from its ``session.yaml``, else from the package."""
+def scene_of(session: Path, given: SceneSource | SessionScene = None) -> SessionScene:
+    """Return the scene of a session: what is `given`, else from its ``session.yaml``, else from the package."""
     own = kept(session, "scene", "--scene") if given is None else None
     if own is None:
         return scene_from(given)
@@ -142,10 +126,6 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
 
     Parameters
     ----------
-    session : Path
-    given : Path, optional
-    joints : int, optional
-        Number of joints, see `boom_twin.messages.mapping.load_mapping`.
     namespace : str
         Namespace of the node, to which names without a leading slash are relative.
 

@@ -27,43 +27,27 @@ _HEAD = "# What this session was made with. scene_sha256 is of the text under sc
 
 @dataclass(frozen=True, slots=True)
 class SessionSheet:
-    """Metadata of a session: version, scene, settings and mapping. A field that is None or empty is left out of the file.
-
-    Attributes
-    ----------
-    version : str
-        Version of this package.
-    scene, parameters, mapping : str or None
-        Text of the scene file, of the ROS parameter file, and of the file that names topics and sensors.
-    topics : dict of str to str or None
-        Type by topic to be recorded; None for a type unknown at the start.
-    note, origin : str or None
-        Note of the operator, and origin of the session.
-    strokes : StrokeReading or None
-        Quantity that the stroke transducers read; None if unknown.
-    twin : dict of str to object
-        Parameters of the running twin; empty without a twin.
-    started : datetime or None
-        Start of the recording; None for a synthetic session.
-    """
+    """Metadata of a session: version, scene, settings and mapping. A field that is None or empty is left out of the file."""
 
     version: str
+    # scene, parameters, mapping: text of the scene file, of the ROS parameter file, and of the file that names topics and
+    # sensors
     scene: str | None = None
     parameters: str | None = None
     mapping: str | None = None
+    # type by topic to be recorded; None for a type unknown at the start
     topics: Mapping[str, str | None] = field(default_factory=dict)
-    note: str | None = None
+    note: str | None = None  # note, origin: note of the operator, and origin of the session
     origin: str | None = None
-    twin: Mapping[str, object] = field(default_factory=dict)
-    started: datetime | None = None
-    strokes: StrokeReading | None = None
+    twin: Mapping[str, object] = field(default_factory=dict)  # parameters of the running twin; empty without a twin
+    started: datetime | None = None  # start of the recording; None for a synthetic session
+    strokes: StrokeReading | None = None  # quantity that the stroke transducers read; None if unknown
 
     def write(self, directory: Path, counts: Sequence[Mapping[str, str | int | None]] | None = None) -> None:
         """Write ``session.yaml`` beside the bag, all of it or nothing.
 
         Parameters
         ----------
-        directory : Path
         counts : sequence of dict, optional
             At the end: each topic with what became of its messages; None is unknown. A recording that was killed has none.
 
@@ -112,7 +96,6 @@ def kept(session: Path, key: str, option: str) -> KeptText | None:
 
     Parameters
     ----------
-    session : Path
     key : str
         Key of ``session.yaml``: scene, parameters, mapping, ..
     option : str

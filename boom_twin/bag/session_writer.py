@@ -22,15 +22,13 @@ from ..twin.readings import samples_of
 from ..types import SECOND, SENSORS, Sample, Stream
 from .async_writer import FileSplit, Storage
 from .session_files import sensor_message
-from .session_model import given_scene
+from .session_model import scene_from
 from .session_sheet import SessionSheet
 from .writer import BagWriter, recorded
 
-CLOCK_SET = SECOND
-"""Step back of a stamp (ns) above which a clock was set; a smaller one is a late row."""
+CLOCK_SET = SECOND  # step back of a stamp (ns) above which a clock was set; a smaller one is a late row
 BY_NAME = "sensor_msgs/msg/JointState"
-CHECK_PERIOD = 0.5
-"""Time (s) between two checks of the disk."""
+CHECK_PERIOD = 0.5  # time (s) between two checks of the disk
 
 
 class LogTimes:
@@ -102,7 +100,7 @@ class SessionWriter:
         note: str | None = None,
         origin: str | None = None,
     ) -> None:
-        self._out, kept = Path(out), given_scene(scene)
+        self._out, kept = Path(out), scene_from(scene)
         self._joints = len(kept.scene.joints)
         path = None if mapping is None else Path(mapping)
         self._topics = load_mapping(path, self._joints)

@@ -19,8 +19,7 @@ from .mcap_records import MOST_HELD
 from .session_file import SessionFile, channel_of, schema_of
 
 MAGIC = b"SQLite format 3\0"
-BESIDE = ("-wal", "-journal")
-"""Suffixes of the files in which sqlite3 keeps data that are not in the database yet."""
+BESIDE = ("-wal", "-journal")  # suffixes of the files in which sqlite3 keeps data that are not in the database yet
 _MESSAGES = "SELECT topic_id, timestamp, data, id FROM messages ORDER BY"
 _ARE_NUMBERS = "typeof(topic_id) = 'integer' AND typeof(timestamp) = 'integer'"
 _LOG_TIMES = f"SELECT id, topic_id, timestamp FROM messages WHERE {_ARE_NUMBERS} ORDER BY id"

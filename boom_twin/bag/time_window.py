@@ -12,8 +12,7 @@ from ..errors import BagError
 from ..messages.message_block import MessageBlock
 from ..types import NANO
 
-NEVER = 2**64 - 1
-"""Log time after all others, ns."""
+NEVER = 2**64 - 1  # log time after all others, ns
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,5 +66,4 @@ class TimeWindow:
         return begin, NEVER if self.duration is None else min(NEVER, begin + round(self.duration / NANO))
 
 
-WHOLE = TimeWindow()
-"""Window of the whole session."""
+WHOLE = TimeWindow()  # window of the whole session

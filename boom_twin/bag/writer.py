@@ -45,8 +45,7 @@ def claim_directory(directory: Path) -> None:
         raise BagError(f"{directory}: holds {taken[0]} already, and nothing is overwritten. Choose a new directory.")
 
 
-CHUNK_SIZE = 64 * 1024
-"""Bytes of messages that wait in memory: about one second of a 200 Hz session."""
+CHUNK_SIZE = 64 * 1024  # bytes of messages that wait in memory: about one second of a 200 Hz session
 RESULT_CHUNK_SIZE = 512 * 1024
 """Bytes of messages in a chunk of a result bag: about a second of all outputs at 200 Hz. Fewer chunks need less index."""
 LIBRARY = "boom_twin"
@@ -65,14 +64,8 @@ class BagWriter:
 
     Parameters
     ----------
-    directory : Path
-        Made if it is not there.
     notes : dict of str to str, optional
         Kept in every file and in ``custom_data``.
-    compression : CompressionType, optional
-        Compression of the chunks.
-    distro : str, optional
-        ROS distribution named in the metadata.
     chunk_size : int, optional
         Bytes of a chunk, before it is compressed.
 
@@ -253,7 +246,7 @@ def recorded(topic: Topic) -> Recorded:
     return Recorded.offered(topic.absolute, topic.type, definition, topic.qos, jazzy().hash_rihs01(topic.type))
 
 
-class SessionWriter:
+class MessageWriter:
     """Context manager that writes a session of one file.
 
     Leaving the context completes the bag. After an exception the file keeps no end, so that it is not taken for whole;
@@ -261,13 +254,10 @@ class SessionWriter:
 
     Parameters
     ----------
-    directory : Path
     topics : dict of str to Topic
         Topics by any key, which `write` takes. Names are made absolute.
     notes : dict of str to str, optional
         For instance that the session is synthetic, and its origin.
-    **options
-        As of `BagWriter`.
     """
 
     def __init__(

@@ -31,8 +31,7 @@ from .rigs import LEAST_SESSIONS, Drift, RigSummary, as_dict
 from .session_task import ALARM, OK, Row
 
 MARK, TABLE, RIGS, PAGE = "batch.json", "sessions.parquet", "rigs.json", "batch.html"
-ROWS, SESSIONS = "rows", "sessions"
-"""Folders of the rows, and of the replays."""
+ROWS, SESSIONS = "rows", "sessions"  # folders of the rows, and of the replays
 DIGEST = "row_sha256"  # key of a row's digest in its file, by which a change is detected
 _OWN = frozenset({MARK, TABLE, RIGS, PAGE, ROWS, SESSIONS})
 

@@ -15,14 +15,11 @@ from ..types import SECOND
 from .session_task import OK, Row
 
 HOUR, DAY = 3600.0, 86400.0  # s
-DAMAGE = "fatigue_damage_"
-"""Prefix of the columns with the damage of a station."""
+DAMAGE = "fatigue_damage_"  # prefix of the columns with the damage of a station
 DRIFTING = ("residual_mean_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
 """Prefixes of the figures whose drift is computed."""
-LEAST_SESSIONS = 4
-"""Least number of sessions for a drift: a line with two residual degrees of freedom."""
-CHANCE = 1e-3
-"""Largest p-value of a significant drift, as in `boom_twin.report.compare.SIGNIFICANT`."""
+LEAST_SESSIONS = 4  # least number of sessions for a drift: a line with two residual degrees of freedom
+CHANCE = 1e-3  # largest p-value of a significant drift, as in `boom_twin.report.compare.SIGNIFICANT`
 
 
 @dataclass(frozen=True, slots=True)

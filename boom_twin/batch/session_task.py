@@ -107,8 +107,7 @@ def _wait_for_end() -> None:
         os.killpg(0, signal.SIGKILL)
 
 
-OK, FAILED = "ok", "failed"
-"""Status of a row."""
+OK, FAILED = "ok", "failed"  # status of a row
 ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")  # keys of an alarm in a row
 Row = dict[str, Any]
 
@@ -180,11 +179,11 @@ def row_of(task: SessionTask) -> Row:
     with result_folder(Path(task.out), REPLAY, [session]) as building:
         found = evaluated_replay(building, session, scene, settings, options, category=task.fatigue)
         if task.report:
-            draw(found.result, found.history, found.scene, building.folder)
-            write_report(found, building.folder)
-        _, quantities = read(building.folder)
+            draw(found.result, found.history, found.scene, building)
+            write_report(found, building)
+        _, quantities = read(building)
         if not task.keep_bag:
-            rmtree(building.folder / "bag")
+            rmtree(building / "bag")
     result, summary = found.result, found.result.summary
     row = _head(task) | {"status": OK, "reason": None, "first_stamp_ns": result.recording.first}
     row |= {name: value for name, value in summary.items() if name not in ("events", "alarms")}

@@ -28,32 +28,14 @@ NEAR = 1.0  # standard deviations of the estimate, of a step, from which on the 
 
 @dataclass(frozen=True)
 class Fit:
-    """Result of a fit; deviations are in units of the priors'.
+    """Result of a fit; deviations of p unknowns are in units of the priors'."""
 
-    Attributes
-    ----------
-    deviations : ndarray, shape (p,)
-        Of the unknowns from their present values.
-    information : ndarray, shape (p, p)
-        Fisher's, without the priors.
-    scatter : ndarray, shape (p, p)
-        Covariance of the score, from blocks of readings.
-    pull : ndarray, shape (p,)
-        Score and pull of the priors that are left; 0 but where a bound stops the fit.
-    by_model : ndarray, shape (p, q)
-        Change of the score by parameters that are taken to be known, by the deviation that they may be wrong by.
-    misfits : ndarray, shape (c,)
-        Root mean square of each channel's normalised innovations, with the noise that the settings state. It is 1 where noise
-        alone is left, and without readings.
-    passes : int
-    """
-
-    deviations: Array
-    information: Array
-    scatter: Array
-    pull: Array
-    by_model: Array
-    misfits: Array
+    deviations: Array  # (p,), of the unknowns from their present values
+    information: Array  # (p, p), Fisher's, without the priors
+    scatter: Array  # (p, p), covariance of the score, from blocks of readings
+    pull: Array  # (p,), score and pull of the priors that are left; 0 but where a bound stops the fit
+    by_model: Array  # (p, q), change of the score by parameters taken to be known, by the deviation that they may be wrong by
+    misfits: Array  # (c,), rms of each channel's normalised innovations with the stated noise; 1: noise alone, or no readings
     passes: int
 
     @property

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml.error import YAMLError
-
 from ..bag.session_sheet import kept
 from ..config.yaml_text import plain, with_value, yaml_text
-from ..errors import SceneError, UsageError
+from ..errors import UsageError
 from ..messages.mapping import load_mapping
 from ..messages.topic_table import factor
-from ..scene.edit import anew
-from ..scene.load import parse, structure, with_end_mark
+from ..scene.edit import rewritten
+from ..scene.load import with_end_mark
 from ..scene.schema import Scene
 from ..system.atomic_files import check_target, write_atomic
 from ..types import Stream
 from .run import Calibration, Estimate
-
-DIGITS = 1e-5  # relative; values are written with six digits
 
 
 def mapping_path(out: Path) -> Path:
@@ -60,30 +56,17 @@ def write_scene(found: Calibration, scene: Scene, text: str, out: Path, credit: 
     note = provenance(found, credit)
     description = f"{scene.description.rstrip()}\n{note}" if scene.description else note
     wanted = found.scene.model_copy(update={"description": description})
-    try:
-        for place, value in _changes(scene.model_dump(), wanted.model_dump(), ()):
-            text = with_value(text, place, value)
-        read, _, faults = structure(parse(text, "calibrated scene"))
-    except (YAMLError, SceneError):
-        read, faults = None, []
-    if read is None or faults or not _same(read.model_dump(), wanted.model_dump()):
-        text = anew(wanted)  # blocks share their text, so that an edit of one changes another
-    write_atomic(out, with_end_mark(text))
+    write_atomic(out, with_end_mark(rewritten(text, scene, wanted)))
 
 
 def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path, credit: str, joints: int) -> Path | None:
     """Write the zeros of the sensors into a mapping beside the scene; return None if there are none to write.
 
-    Parameters
-    ----------
-    bag : Path
-        A session, of which the mapping that it was recorded with is gone on from.
-    mapping : Path, optional
-        What was given instead.
+    They are added to `mapping` if given, else to the one that the session `bag` was recorded with.
     """
     if not found.zeros:
         return None
-    text, zeros = _mapping_text(found, bag, mapping), _in_readings(found, joints)
+    text, zeros = _mapping_text(bag, mapping), _in_readings(found, joints)
     if "sensors" in (plain(text) or {}):
         for name, zero in zeros.items():
             text = with_value(text, ("sensors", name, "zero"), zero)
@@ -103,34 +86,12 @@ def _in_readings(found: Calibration, joints: int) -> dict[str, float]:
     return {name: sensors[name].zero + shift / factor(name, sensors[name]) for name, shift in found.zeros.items()}
 
 
-def _mapping_text(found: Calibration, bag: Path, mapping: Path | None) -> str:
+def _mapping_text(bag: Path, mapping: Path | None) -> str:
     """Return the text of the sessions' mapping; empty for the package's own."""
     if mapping is not None:
         return mapping.read_text(encoding="utf-8-sig")
     own = kept(bag, "mapping", "--mapping")
     return "" if own is None else own.text
-
-
-def _changes(before: Any, after: Any, place: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Any]]:
-    """Yield the places of the single values that differ, with their new ones."""
-    if isinstance(after, dict):
-        for key, value in after.items():
-            yield from _changes(before.get(key) if isinstance(before, dict) else None, value, (*place, key))
-    elif isinstance(after, tuple) and isinstance(before, tuple):
-        for i, (one, other) in enumerate(zip(before, after, strict=True)):
-            yield from _changes(one, other, (*place, i))
-    elif after != before:
-        yield place, after
-
-
-def _same(one: Any, other: Any) -> bool:
-    if isinstance(one, dict):
-        return isinstance(other, dict) and one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
-    if isinstance(one, tuple | list):
-        return isinstance(other, tuple | list) and len(one) == len(other) and all(map(_same, one, other))
-    if isinstance(one, float) and isinstance(other, float):
-        return math.isclose(one, other, rel_tol=DIGITS)
-    return bool(one == other)
 
 
 SHOWN = {"rad": (180.0 / math.pi, "deg"), "m": (1e3, "mm")}

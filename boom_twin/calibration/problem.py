@@ -37,17 +37,7 @@ class Noise:
 
 
 class RestingBoom:
-    """Boom of one trial of the unknowns, and its filter in a rest period.
-
-    Parameters
-    ----------
-    scene : Scene
-    zeros : ndarray, shape (c,)
-        What the channels read too much, SI.
-    rigging : Rigging
-    gravity : ndarray, shape (2,)
-        m/s^2.
-    """
+    """Boom of one trial of the unknowns, and its filter in a rest period; `zeros` (c,) are those of the channels, SI."""
 
     def __init__(self, scene: Scene, zeros: Array, rigging: Rigging, gravity: Array) -> None:
         self._boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads, rigging.places)
@@ -72,16 +62,8 @@ class RestingBoom:
 class CalibrationProblem:
     """Innovations of all rest periods as a function of the unknowns.
 
-    Unknowns are counted in standard deviations of their priors, from the present values (`Unknown.value`).
-
-    Attributes
-    ----------
-    scene : Scene
-    unknowns : sequence of Unknown
-    channels : ndarray of int, shape (r,)
-        Channel of each reading.
-    blocks : ndarray of int, shape (r,)
-        Ascending numbers of blocks of `BLOCK` s.
+    Unknowns are counted in standard deviations of their priors, from the present values (`Unknown.value`). `channels` (r,)
+    has the channel of each reading, `blocks` (r,) ascending numbers of blocks of `BLOCK` s.
     """
 
     def __init__(self, scene: Scene, unknowns: Sequence[Unknown], periods: Sequence[RestPeriod], rigging: Rigging) -> None:

@@ -52,32 +52,13 @@ def note_drives(t, boom, live, work, p, f, stamps, lengths, gravity, row, drives
 
 @kernel
 def filter_rest(p, f, loads, zero2, gravity, inclination, times, channels, values, variances, found, zeros):
-    """Write the innovations of a rest period, and their variances.
+    """Write the innovations of a rest period with their variances `found` (r, 2), and the zeros (2 + n,) estimated at its end.
 
-    Parameters
-    ----------
-    p, f : Posture, Filters
-        Of the boom at rest. The filter's model `VALVES` is used.
-    loads : ndarray, shape (2,)
-        Variances of the fast load along x and y, N^2.
-    zero2 : ndarray, shape (2 + n,)
-        Variances of the zeros of the IMU's axes, m^2/s^4, and of the angle sensors, rad^2.
-    gravity : ndarray, shape (2,)
-        m/s^2.
-    inclination : float
-        Of the base, rad.
-    times : ndarray, shape (r,)
-        Of the readings, s, ascending.
-    channels : ndarray of int, shape (r,)
-        Lengths (n), angles (n), axes of the IMU (2), forces (n).
-    values : ndarray, shape (r,)
-        In SI units.
-    variances : ndarray, shape (channels,)
-        Of the sensors' noise.
-    found : ndarray, shape (r, 2)
-        Innovations and their variances.
-    zeros : ndarray, shape (2 + n,)
-        The zeros as they are estimated at the end.
+    `p`, `f` are `Posture` and `Filters` of the boom at rest, of which the model `VALVES` is used. Variances: `loads` (2,) of
+    the fast load along x and y, N^2; `zero2` (2 + n,) of the zeros of the IMU's axes, m^2/s^4, and of the angle sensors,
+    rad^2; `variances` (channels,) of the sensors' noise. `gravity` (2,) is in m/s^2, `inclination` of the base in rad.
+    Readings: `times` (r,), s, ascending; `channels` (r,): lengths (n), angles (n), axes of the IMU (2), forces (n); `values`
+    (r,), SI.
     """
     n, size, zero = p.drives.shape[0], all_states(p), zero_place(p)
     x, covariance = f.x[VALVES], f.p[VALVES]

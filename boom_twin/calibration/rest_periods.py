@@ -37,27 +37,13 @@ class Rigging:
 
 @dataclass(frozen=True)
 class RestPeriod:
-    """Readings while no drive moves.
+    """Readings while no drive moves."""
 
-    Attributes
-    ----------
-    start : float
-        s since the first stroke sample of the session.
-    times : ndarray, shape (r,)
-        s after the period began, ascending.
-    channels : ndarray of int, shape (r,)
-        Places in `channel_names`.
-    values : ndarray, shape (r,)
-        SI; finite.
-    strokes : ndarray, shape (n,)
-        Mean readings of the stroke transducers, m.
-    """
-
-    start: float
-    times: Array
-    channels: NDArray[np.int64]
-    values: Array
-    strokes: Array
+    start: float  # s since the first stroke sample of the session
+    times: Array  # (r,), s after the period began, ascending
+    channels: NDArray[np.int64]  # (r,), places in `channel_names`
+    values: Array  # (r,), SI; finite
+    strokes: Array  # (n,), mean readings of the stroke transducers, m
 
 
 def channel_names(joints: int) -> tuple[str, ...]:
@@ -73,12 +59,7 @@ def rest_periods(
 ) -> list[RestPeriod]:
     """Return the rest periods of a session up to the stamp `until` (ns).
 
-    Raises
-    ------
-    BagError
-        It rests too little.
-    SolverError
-        The boom has no equilibrium at its strokes.
+    BagError if it rests too little, SolverError if the boom has no equilibrium at its strokes.
     """
     boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads, rigging.places)
     strokes = session.series[Stream.STROKES]

@@ -86,6 +86,8 @@ class Calibration:
         How the sensors of the sessions were read.
     remarks : tuple of str
         What a reader should know.
+    unusable : str
+        The remark that the result must not be used; empty if it may be.
     """
 
     scene: Scene
@@ -100,6 +102,7 @@ class Calibration:
     after: HeldOutResult
     mapped: Mapped
     remarks: tuple[str, ...]
+    unusable: str
 
 
 def calibrate(
@@ -111,35 +114,18 @@ def calibrate(
     progress: Progress = lambda share, what: None,
     window: TimeWindow = WHOLE,
 ) -> Calibration:
-    """Estimate parameters of `scene` from healthy sessions of its boom.
+    """Estimate parameters of `scene` from healthy sessions of its boom, each begun at rest.
 
-    Parameters
-    ----------
-    bags : sequence of path
-        Recorded sessions, each begun at rest. The last one is held out; of a single one, its last third.
-    choice : Choice, optional
-    settings : Settings, optional
-        Noise of the sensors; the package's own by default.
-    mapping : path, optional
-        Of topics and sensors; by default as the sessions were recorded, see `boom_twin.messages.mapping`.
-    progress : callable, optional
-        Told the share done and what comes next.
-    window : TimeWindow, optional
-        The part of each session that is used.
-
-    Returns
-    -------
-    Calibration
-        Estimates with their intervals, what the sessions do not tell, and the residuals on what was held out.
+    The last session is held out; of a single one, its last third. `settings` give the noise of the sensors. `mapping` is by
+    default that of the sessions. `progress` is told the share done and what comes next. `window` is the part of each session
+    that is used.
 
     Raises
     ------
     UsageError
         A parameter that the scene lacks; sessions with different mappings; nothing that the sessions could tell.
-    BagError
-        A session that cannot be used.
-    SolverError
-        The model fails on a session.
+    BagError, SolverError
+        A session that cannot be used; the model fails on it.
     """
     settings, choice = settings or Settings(), choice or Choice()
     progress(0.0, "reading")
@@ -170,8 +156,9 @@ def calibrate(
     after = judged(better, rigging, sessions[-1], zeros, kept_from)
     progress(1.0, "done")
     held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
-    remarks = tuple(_remarks(fit, problem.names, estimates, sessions) + _worse(before, after))
-    misfit, judgements = float(fit.misfits.max()), (held_out, before, after, mapped, remarks)
+    unusable = _worse(before, after)
+    remarks = (*_remarks(fit, problem.names, estimates, sessions), *([unusable] if unusable else []))
+    misfit, judgements = float(fit.misfits.max()), (held_out, before, after, mapped, remarks, unusable)
     return Calibration(better, zeros, estimates, tuple(groups), misfit, fit.passes, tuple(sessions), *judgements)
 
 
@@ -243,16 +230,17 @@ def _estimates(problem: CalibrationProblem, fit: Fit, groups: Sequence[Inseparab
     return tuple(found)
 
 
-def _worse(before: HeldOutResult, after: HeldOutResult) -> list[str]:
+def _worse(before: HeldOutResult, after: HeldOutResult) -> str:
+    """Return which residuals have grown on what was held out, and the remedy; empty if none has."""
     worse = [
         name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > GROWN * max(old, 1.0)
     ]
     if not worse:
-        return []
-    return [
+        return ""
+    return (
         f"On what was held out the residuals of {', '.join(worse)} have grown: do not use this result. Record a session that "
         "tells what was left as before, or estimate fewer parameters."
-    ]
+    )
 
 
 def _remarks(fit: Fit, names: Sequence[str], estimates: Sequence[Estimate], sessions: Sequence[MeasuredSession]) -> list[str]:

@@ -39,23 +39,12 @@ class Series:
 
 @dataclass(frozen=True)
 class MeasuredSession:
-    """One session.
-
-    Attributes
-    ----------
-    name : str
-    digest : str
-        First digits of the SHA-256 of its files.
-    series : dict of Stream to Series
-        The streams that it has.
-    changed : bool
-        Whether something was changed while it was recorded: a load, a zero.
-    """
+    """One session."""
 
     name: str
-    digest: str
-    series: dict[Stream, Series]
-    changed: bool = False
+    digest: str  # first digits of the SHA-256 of its files
+    series: dict[Stream, Series]  # the streams that it has
+    changed: bool = False  # a load or a zero was changed while it was recorded
 
     def samples(self, zeros: Mapping[str, float] | None = None) -> list[Sample]:
         """Return all samples in the order of their stamps, strokes first, less the `zeros` by channel."""
@@ -70,13 +59,7 @@ class MeasuredSession:
 
 
 def read_sessions(paths: Sequence[Path], topics: Topics, joints: int, window: TimeWindow = WHOLE) -> list[MeasuredSession]:
-    """Read sessions, the same window of each.
-
-    Raises
-    ------
-    BagError
-        One cannot be read, is of another boom, or lacks strokes of this one.
-    """
+    """Read sessions, the same window of each; BagError for one of another boom, without its strokes, or that cannot be read."""
     sessions = [scan(path) for path in paths]
     for session in sessions:
         refuse_other_names(session, topics, joints)

@@ -18,24 +18,13 @@ LEAST_LOAD = 1e-3  # kg, kg/m; a load of nothing is another model
 
 @dataclass(frozen=True, slots=True)
 class UnknownKind:
-    """Kind of a parameter.
-
-    Attributes
-    ----------
-    unit : str
-    prior, useful : float
-        Deviation that is expected of the present value, and the one from which an estimate is of use.
-    relative : bool
-        Whether these two are shares of the value, which stays positive; else they have its unit.
-    least : float
-        Smallest standard deviation of an estimate: the error of the model's statics looks like a zero.
-    """
+    """Kind of a parameter."""
 
     unit: str
-    prior: float
-    useful: float
-    relative: bool = False
-    least: float = 0.0
+    prior: float  # deviation that is expected of the present value
+    useful: float  # deviation from which an estimate is of use
+    relative: bool = False  # these two are shares of the value, which stays positive; else they have its unit
+    least: float = 0.0  # smallest standard deviation of an estimate: the error of the model's statics looks like a zero
 
 
 KINDS = {
@@ -109,19 +98,11 @@ def usual_names(
     stiffness: bool = False,
     zeros: str = "all",
 ) -> list[str]:
-    """Return the default unknowns: stiffness of every cylinder, zero of every sensor, and those requested.
+    """Return the default unknowns: stiffness of every cylinder, zero of every sensor of `streams`, and those requested.
 
-    Parameters
-    ----------
-    streams : sequence of Stream
-        That are there.
-    load : {"payload", "line_fill"}, optional
-    damping : {"d", "beta"}, optional
-        Of cylinders, or of sections.
-    stiffness : bool
-        Bending stiffness of the sections, and stiffness of an elastic base.
-    zeros : {"all", "angles", "none"}
-        Of all sensors, of all but the stroke transducers, which are then taken to be right, or none.
+    `load` is payload or line_fill; `damping` d (cylinders) or beta (sections); `stiffness` adds that of sections in bending
+    and of an elastic base; `zeros` are all, angles (all but those of stroke transducers, which are then taken to be right) or
+    none.
     """
     ends = [".k", *([f".{damping}"] if damping else []), *([".EI", ".stiffness"] if stiffness else [])]
     names = [name for end in ends for name in parameter_names(scene) if name.endswith(end)]
@@ -139,10 +120,7 @@ def zero_names(scene: Scene, streams: Sequence[Stream] = tuple(Stream)) -> list[
 def unknowns_of(scene: Scene, names: Sequence[str]) -> tuple[Unknown, ...]:
     """Return the unknowns of these names; zeros are 0 at present, since the mapping has applied the known ones.
 
-    Raises
-    ------
-    UsageError
-        The scene has no such parameter, or a name stands there twice; none at all.
+    UsageError if the scene has no such parameter, if a name stands there twice, or for none at all.
     """
     known = [*parameter_names(scene), *zero_names(scene)]
     if not names:

@@ -18,21 +18,12 @@ from .sessions import MeasuredSession
 
 @dataclass(frozen=True)
 class HeldOutResult:
-    """Residuals of k samples in c channels, NaN where not measured.
-
-    Attributes
-    ----------
-    names : tuple of str
-    times : ndarray, shape (k,)
-        s after the first of them.
-    values, sigmas : ndarray, shape (k, c)
-        In the unit of the sensor, and expected.
-    """
+    """Residuals of k samples in c channels, NaN where not measured."""
 
     names: tuple[str, ...]
-    times: Array
-    values: Array
-    sigmas: Array
+    times: Array  # (k,), s after the first of them
+    values: Array  # (k, c), in the unit of the sensor
+    sigmas: Array  # (k, c), expected
 
     @property
     def spread(self) -> Array:
@@ -47,17 +38,9 @@ def judged(
     zeros: Mapping[str, float],
     start: int,
 ) -> HeldOutResult:
-    """Run a session through the twin of `scene`, and keep the residuals from stamp `start` on.
+    """Run a session, less the sensors' `zeros`, through the twin of `scene`; keep the residuals from stamp `start` on.
 
-    Parameters
-    ----------
-    zeros : dict of str to float
-        What sensors read too much, by channel.
-
-    Raises
-    ------
-    BagError
-        The twin predicts nothing there.
+    BagError if the twin predicts nothing there.
     """
     twin = Twin(scene, rigging.settings, rigging.mounts, reads=rigging.reads, places=rigging.places)
     found: dict[Stream, list[Residuals]] = {stream: [] for stream in Stream}

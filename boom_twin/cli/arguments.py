@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 
 SESSION = "a rosbag2 directory, a directory of its files, or one file: .mcap, .db3, .bag of ROS 1, .csv"
+SESSION_SCENE = "scene file (YAML); without it, the one that the session was made with, else the default scene"
 
 
 def add_scene(parser: ArgumentParser) -> None:
@@ -24,12 +25,6 @@ def add_scene(parser: ArgumentParser) -> None:
     either = parser.add_mutually_exclusive_group()
     either.add_argument("--scene", metavar="SCENE", help="scene file (YAML); without it, the default scene")
     either.add_argument("scene", nargs="?", default=SUPPRESS, metavar="SCENE", help="the same, without --scene before it")
-
-
-def add_session_scene(parser: ArgumentParser) -> None:
-    """Declare ``--scene`` of a command that reads a session; see `boom_twin.cli.output.open_session_scene`."""
-    purpose = "scene file (YAML); without it, the one that the session was made with, else the default scene"
-    parser.add_argument("--scene", metavar="SCENE", help=purpose)
 
 
 def add_place(parser: ArgumentParser) -> Any:
@@ -47,19 +42,14 @@ def add_file(parser: ArgumentParser, option: str, purpose: str, metavar: str = "
     parser.add_argument(option, metavar=metavar, type=Path, help=purpose)
 
 
-def add_params(parser: ArgumentParser) -> None:
-    """Declare ``--params``, see `boom_twin.cli.output.open_session_settings`."""
-    add_file(parser, "--params", "ROS parameter file (as recorded, else the package's twin.yaml)")
-
-
-def add_mapping(parser: ArgumentParser) -> None:
-    """Declare ``--mapping``, for `boom_twin.bag.session_model.mapping_of`."""
-    purpose = "topics and sensors; by default as the session was recorded, else what `boom_twin mapping` prints"
-    add_file(parser, "--mapping", purpose)
-
-
-def add_window(parser: ArgumentParser) -> None:
-    """Declare ``--start`` and ``--duration``, for `window_of`."""
+def add_session(parser: ArgumentParser, params: bool = True, mapping: bool = True, scene: str = SESSION_SCENE) -> None:
+    """Declare the options by which a recorded session is read: scene, parameters, mapping, window."""
+    parser.add_argument("--scene", metavar="SCENE", help=scene)
+    if params:
+        add_file(parser, "--params", "ROS parameter file (as recorded, else the package's twin.yaml)")
+    if mapping:
+        purpose = "topics and sensors; by default as the session was recorded, else what `boom_twin mapping` prints"
+        add_file(parser, "--mapping", purpose)
     begin = "begin so many seconds after the first sample (0); the model then starts at rest there"
     parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help=begin)
     parser.add_argument("--duration", type=positive, metavar="S", help="read so many seconds (all)")
@@ -171,21 +161,16 @@ def placed_sensors_of(text: str, scene: Scene) -> list[tuple[str, Stream, dict[s
     """
     names = [name.strip() for name in text.split(",") if name.strip()]
     sensors_of(",".join(name for name in names if name.partition("@")[0] not in PLACED or "@" not in name))
-    places, stems = dict[str, Place](), dict[tuple[str, str], str]()
+    placed: dict[tuple[str, str], tuple[str, Place]] = {}  # name and place by kind and text
     for kind in ("imu", "moment", "point"):
         texts = list(dict.fromkeys(at for name in names if _placed(name)[0] == kind and (at := _placed(name)[1])))
-        found = named_places(kind, texts, scene)
-        stems |= {(kind, at): stem for at, stem in zip(texts, found, strict=True)}
-        places |= found
+        placed |= {(kind, at): found for at, found in zip(texts, named_places(kind, texts, scene).items(), strict=True)}
     chosen = []
     for name in names:
-        kind, at = _placed(name)
-        stem = stems.get((kind, at), "")
-        if name.startswith("gyro@"):
-            stem += "_rate"
-        stream = Stream.MOMENTS if kind == "moment" else Stream(stem) if stem else SENSORS[name]
-        own = stems.get((kind, at))
-        chosen.append((name, stream, {own: places[own]} if own else {}))
+        stem, place = placed.get(_placed(name), ("", None))
+        end = "_rate" if name.startswith("gyro") else ""
+        stream = Stream.MOMENTS if name.startswith("moment") else Stream(stem + end) if stem else SENSORS[name]
+        chosen.append((name, stream, {stem: place} if place else {}))
     return chosen
 
 

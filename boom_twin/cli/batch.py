@@ -11,18 +11,15 @@ from typing import TYPE_CHECKING
 
 from ..errors import BagError, UsageError
 from ..offline.progress import progress_of
-from .arguments import add_file, add_mapping, add_params, add_window, at_least, positive, window_of
+from .arguments import add_session, at_least, positive, window_of
 from .output import tell, warn
 
 if TYPE_CHECKING:
     from ..batch.results import BatchFolder
     from ..batch.session_task import Row, SessionTask
 
-MEGABYTE = 1_000_000
-
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     sources = "sessions, globs (quote them), or files *.txt that list these, one a line"
     parser.add_argument("bags", nargs="+", metavar="BAG", help=sources)
     place = "folder for sessions.parquet, batch.html and the replays: new, empty, or of an earlier batch, which goes on"
@@ -34,10 +31,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--workers", metavar="N", type=at_least(1), help="sessions at once on this machine; by default as many as cores"
     )
     scene = "scene file (YAML) for all sessions; without it, the one that each was made with, else the default scene"
-    add_file(parser, "--scene", scene, "SCENE")
-    add_params(parser)
-    add_mapping(parser)
-    add_window(parser)
+    add_session(parser, scene=scene)
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
     parser.add_argument("--calibrate", action="store_true", help="estimate the scene's parameters from every session as well")
     fatigue = "damage of all stations, summed up by rig: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
@@ -98,11 +92,11 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
     from ..system.received_files import sha256_of
 
     given = {name: getattr(args, name) for name in ("scene", "params", "mapping")}
-    contents = [f"{name} {sha256_of(path.resolve())}" for name, path in given.items() if path is not None]
+    paths = {name: None if path is None else str(Path(path).resolve()) for name, path in given.items()}
+    contents = [f"{name} {sha256_of(Path(path))}" for name, path in paths.items() if path is not None]
     window = window_of(args)
     kinds = [str(args.report), str(args.keep_bags), str(args.calibrate), str(args.fatigue)]
     options = "\n".join([__version__, *kinds, str(window), *contents])
-    paths = {name: None if path is None else str(path.resolve()) for name, path in given.items()}
     return [
         SessionTask(
             key=(key := key_of(session)),
@@ -117,7 +111,7 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
             report=args.report,
             keep_bag=args.keep_bags,
             time=args.timeout,
-            memory=round(args.memory * MEGABYTE),
+            memory=round(1e6 * args.memory),
             retries=args.retries,
         )
         for session in sessions

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import __version__
-from ..errors import UsageError
+from ..errors import BoomTwinError, UsageError
 from ..offline.progress import progress_of
-from .arguments import add_json, add_mapping, add_params, add_session_scene, add_window, files_of, window_of
+from .arguments import add_json, add_session, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, warn, warn_incomplete
 
 if TYPE_CHECKING:
@@ -21,9 +21,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bags", nargs="+", metavar="BAG", help="healthy sessions, begun at rest; the last one is held out")
-    add_session_scene(parser)
     parser.add_argument("--out", type=Path, metavar="SCENE", required=True, help="the new scene; zeros: a mapping beside it")
     parser.add_argument("--parameters", metavar="A,B,..", help="just these, as cylinder_1.k,joint_2.zero; else those below")
     parser.add_argument("--load", choices=("payload", "line_fill"), help="besides k of cylinders and zeros of sensors: a load")
@@ -33,9 +31,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     whose = "zeros of all sensors (default), of all but the stroke transducers, or none"
     parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
-    add_params(parser)
-    add_mapping(parser)
-    add_window(parser)
+    add_session(parser)
     parser.add_argument("--date", metavar="DATE", help="for the provenance; today if not given")
     parser.add_argument("--force", action="store_true", help="replace files of the result that are there already")
     parser.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
@@ -43,7 +39,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Run the calibration, write the scene and print the result."""
+    """Run the calibration, write the scene and print the result; exit code 1 if it must not be used."""
     from ..bag.reader import scan
     from ..calibration.output import as_object, as_text, mapping_path, refuse_overwriting, write_mapping, write_scene
     from ..calibration.run import Choice, calibrate
@@ -70,6 +66,8 @@ def run(args: Namespace) -> int:
     print_result(args.json, as_object(found) | {"wall_s": wall, "files": written}, [*as_text(found), f"{wall:.1f} s", *written])
     for bag in args.bags:
         warn_incomplete(scan(Path(bag)))
+    if found.unusable:
+        raise BoomTwinError(f"{args.out}: {found.unusable}")
     return 0
 
 
@@ -97,7 +95,6 @@ def _moving(bar: ProgressBar) -> Progress:
 
 
 def _draw(found: Calibration, out: Path) -> list[Path]:
-    """Draw pictures beside the scene."""
     from ..calibration.output import picture_paths, shown
     from ..plots.session import Interval, held_out_picture, parameters_picture
 

@@ -25,14 +25,12 @@ from .output import columns, open_scene, print_result, tell
 if TYPE_CHECKING:
     from ..deviation.accuracy import TipAccuracy
 
-PNG = b"\x89PNG"
-"""First bytes of a picture; only such a file is replaced."""
+PNG = b"\x89PNG"  # first bytes of a picture; only such a file is replaced
 SIZE_A = "angle of the section, cylinder force"
 SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the scene, ``--json``, and the options of a search for the smallest model."""
     add_scene(parser)
     add_json(parser)
     parser.add_argument("--strict", action="store_true", help="warnings are errors: the exit code is 1 if there are any")
@@ -89,18 +87,18 @@ def _draw(path: Path, scene: Scene, name: str) -> Path:
 
 def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str, Any]:
     """Return the description of the scene as one flat object."""
-    sections, joints = account.sections, account.joints
+    sections, joints, base = account.sections, account.joints, account.scene.base.stiffness
     return {
         "scene": name,
         "sections": len(sections),
-        "kinds": [joint.kind for joint in joints],
-        "length_m": account.length,
-        "section_length_m": [section.length for section in sections],
+        "kinds": [joint.kind for joint in account.scene.joints],
+        "length_m": account.scene.reach,
+        "section_length_m": [section.length for section in account.scene.sections],
         "mass_kg": account.mass,
         "section_mass_kg": [section.mass for section in sections],
-        "joint_mass_kg": [joint.mass for joint in joints],
-        "payload_kg": account.payload,
-        **({"base_stiffness_Nm_rad": account.base.stiffness} if account.base.stiffness is not None else {}),
+        "joint_mass_kg": [joint.mass for joint in account.scene.joints],
+        "payload_kg": account.scene.payload,
+        **({"base_stiffness_Nm_rad": base} if base is not None else {}),
         "flexible_parts": [len(section.parts) for section in sections],
         "bending_per_part": [section.bending for section in sections],
         "split_at_m": [[split.x for split in section.splits] for section in sections],
@@ -132,12 +130,12 @@ def _restitutions(scene: Scene) -> dict[str, float]:
 
 def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault]) -> list[str]:
     """Return lines of text for a reader."""
-    kinds = " + ".join(joint.kind for joint in account.joints)
+    kinds = " + ".join(joint.kind for joint in scene.joints)
     count = len(account.sections)
     lines = [f"{name}: this scene can be used"]
     lines += [f"  {scene.description}"] if scene.description else []
-    lines += [f"  {count} section{'s' * (count > 1)}, {kinds}, {account.length:.2f} m, {account.mass:.1f} kg"]
-    lines += _base(account.base)
+    lines += [f"  {count} section{'s' * (count > 1)}, {kinds}, {scene.reach:.2f} m, {account.mass:.1f} kg"]
+    lines += _base(scene.base)
     lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_masses(account)]
     lines += ["", "Sections", *_sections(account)]
     lines += ["", "Joints and cylinders", *_cylinders(account)]
@@ -165,13 +163,15 @@ def _base(base: Base) -> list[str]:
 def _masses(account: Account) -> list[str]:
     rows = [["", "length m", "beam", "root", "head", "line fill", "links", "barrel", "rod", "sum"]]
     for section, joint in zip(account.sections, account.joints, strict=True):
-        own = [section.beam_mass, section.root_mass, section.head_mass, section.fill_mass]
-        drive = [joint.link_mass, joint.barrel_mass, joint.rod_mass]
-        masses = [f"{mass:.1f}" if mass else "-" for mass in own + drive]
-        rows.append([f"section {section.number}", f"{section.length:.2f}", *masses, f"{sum(own + drive):.1f}"])
-    if account.payload:
-        rows.append(["payload", *[""] * 8, f"{account.payload:.1f}"])
-    rows.append(["total", f"{account.length:.2f}", *[""] * 7, f"{account.mass:.1f}"])
+        part, drive = section.section, joint.joint
+        ends = [end.mass if end is not None else 0.0 for end in (part.root, part.head)]
+        rods = [rod.mass if rod is not None else 0.0 for rod in (drive.cylinder.barrel, drive.cylinder.rod)]
+        own = [part.beam_mass, *ends, section.fill_mass, (drive.mL or 0.0) + (drive.mR or 0.0), *rods]
+        masses = [f"{mass:.1f}" if mass else "-" for mass in own]
+        rows.append([f"section {section.number}", f"{part.length:.2f}", *masses, f"{sum(own):.1f}"])
+    if account.scene.payload:
+        rows.append(["payload", *[""] * 8, f"{account.scene.payload:.1f}"])
+    rows.append(["total", f"{account.scene.reach:.2f}", *[""] * 7, f"{account.mass:.1f}"])
     return _table(rows)
 
 
@@ -180,7 +180,7 @@ def _sections(account: Account) -> list[str]:
 
 
 def _section_words(section: SectionAccount) -> str:
-    if not section.parts and section.has_beam:
+    if not section.parts and section.section.beam is not None:
         return "rigid (modes: 0), with the mass of its beam"
     if not section.parts:
         return "rigid (no beam), all of it described by root"
@@ -198,19 +198,20 @@ def _section_words(section: SectionAccount) -> str:
 def _cylinders(account: Account) -> list[str]:
     rows = [["", "kind", "range deg", "stroke used m", "of m", "oil spring"]]
     for joint in account.joints:
-        low, high = joint.range_deg
+        low, high = joint.joint.range_deg
         used = f"{joint.stroke_low:.3f} to {joint.stroke_high:.3f}"
-        reach = [f"{low:g} to {high:g}", used, f"{joint.max_stroke:g}"]
-        kind = f"{joint.kind}, right" if joint.side == "right" else joint.kind
+        reach = [f"{low:g} to {high:g}", used, f"{joint.joint.cylinder.max_stroke:g}"]
+        kind = f"{joint.joint.kind}, right" if joint.joint.side == "right" else joint.joint.kind
         rows.append([f"joint {joint.number}", kind, *reach, _oil(joint)])
     return _table(rows, left=6)
 
 
 def _oil(joint: JointAccount) -> str:
-    damping = f"d = {joint.d / 1e3:.4g} kN s/m" if joint.d else "no damping"
+    k, d = joint.joint.cylinder.k, joint.joint.cylinder.d
+    damping = f"d = {d / 1e3:.4g} kN s/m" if d else "no damping"
     if joint.k_over_stroke:
         return f"by the oil over the stroke, {damping}"
-    return "incompressible" if joint.k is None else f"k = {joint.k / 1e6:.4g} kN/mm, {damping}"
+    return "incompressible" if k is None else f"k = {k / 1e6:.4g} kN/mm, {damping}"
 
 
 def _linkages(account: Account) -> list[str]:
@@ -253,10 +254,10 @@ def _left_out(account: Account) -> list[str]:
 
 def _unknowns(account: Account) -> list[str]:
     rows = []
-    if account.base.stiffness is not None:
+    if account.scene.base.stiffness is not None:
         rows.append(["base", str(UNKNOWNS_BASE), "turn"])
     for section, joint in zip(account.sections, account.joints, strict=True):
-        rows.append([f"joint {joint.number}", str(joint.unknowns), SIZE_A if joint.kind == "A" else SIZE_B])
+        rows.append([f"joint {joint.number}", str(joint.unknowns), SIZE_A if joint.joint.kind == "A" else SIZE_B])
         if section.parts:
             parts = f"{len(section.parts)} part{'s' * (len(section.parts) > 1)}"
             words = f"{parts} x ({section.bending} bending + {section.axial} axial)"

@@ -8,21 +8,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from .arguments import add_json, add_params, add_session_scene, add_window, files_of, window_of
+from .arguments import add_json, add_session, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell, warn
 
 if TYPE_CHECKING:
     from ..report.compare import ComparedSession, ComparisonRow
-    from ..system.result_folder import UnfinishedResult
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     for name in ("A", "B"):
         parser.add_argument(name, help="a recorded session, which is replayed, or the folder of a replay")
-    add_session_scene(parser)
-    add_params(parser)
-    add_window(parser)
+    add_session(parser, mapping=False)
     kept = "folder for compare.png and the replays: new, empty, or of an earlier compare; without it nothing is kept"
     parser.add_argument("--out", metavar="DIR", help=kept)
     add_json(parser)
@@ -39,7 +35,7 @@ def run(args: Namespace) -> int:
         one, other = (_side(args, Path(getattr(args, name)), building, name) for name in ("A", "B"))
         rows = rows_of(one, other)
         if args.out:
-            _draw(building.folder, one, other, rows)
+            _draw(building, one, other, rows)
     for side in (one, other):
         if side.incomplete:
             warn(f"{side.name}: its session is {side.incomplete}")
@@ -49,7 +45,7 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) -> ComparedSession:
+def _side(args: Namespace, path: Path, building: Path, name: str) -> ComparedSession:
     from ..offline.inputs import ReplayOptions
     from ..report.compare import side_of
     from ..report.evaluation import evaluated_replay
@@ -59,9 +55,9 @@ def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) ->
     def replayed(session: Path) -> Path:
         tell(f"replaying {session} ..")
         scene, settings = open_session_scene(session, args.scene), open_session_settings(session, args.params)
-        inner = building.inner(name)
-        evaluated_replay(inner, session, scene, settings, ReplayOptions(window=window))
-        return inner.folder
+        (building / name).mkdir()
+        evaluated_replay(building / name, session, scene, settings, ReplayOptions(window=window))
+        return building / name
 
     return side_of(path, replayed, window)
 

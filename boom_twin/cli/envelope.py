@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     add_scene(parser)
     add_file(parser, "--out", "folder for envelope.csv (a row a posture), .json and .png", "DIR")
     add_json(parser)
@@ -45,7 +44,7 @@ def run(args: Namespace) -> int:
         values, lines = _examined(scene, None)
     else:
         with result_folder(args.out, ENVELOPE, files_of(args, "scene")) as building:
-            values, lines = _examined(scene, building.folder)
+            values, lines = _examined(scene, building)
         lines += ["", *(f"Written: {args.out / name}" for name in ("envelope.csv", "envelope.json", "envelope.png"))]
     print_result(args.json, values, lines)
     return 0
@@ -125,7 +124,6 @@ def _write(folder: Path, result: Envelope, quantities: list[Quantity], values: d
 
 
 def _csv(result: Envelope, quantities: list[Quantity]) -> str:
-    """Return one row for each posture, SI units; angles in degrees."""
     stream = io.StringIO()
     table = csv.writer(stream, lineterminator="\n")
     angles = [f"section_{i + 1}_deg" for i in range(result.angles.shape[1])]

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="CSV, .parquet, .tdms, .mf4, each at its own rate")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the session, new or empty")
     parser.add_argument("--scene", metavar="SCENE", help="scene file (YAML), which the session keeps")
@@ -59,7 +58,7 @@ def run(args: Namespace) -> int:
         return 0
     sheet = SessionSheet(__version__, None if scene is None else scene.text, note=args.note)
     with result_folder(args.out, IMPORT, [*args.files, *files_of(args, "scene", "columns", "mapping")]) as building:
-        done = import_session(tables, building.folder, given, sheet, joints, args.mapping)
+        done = import_session(tables, building, given, sheet, joints, args.mapping)
     _warn(done, scene is None, given.timezone)
     if scene is not None:
         tell(f"next: boom_twin info {args.out}; its line `wiring` says if units, signs and names fit the boom")
@@ -68,7 +67,6 @@ def run(args: Namespace) -> int:
 
 
 def _warn(done: ImportedSession, is_without_scene: bool, timezone: str | None) -> None:
-    """Warn of what was assumed and of what was left out."""
     for number, read in done.read.items():
         if read.rows.remark:
             warn(f"{done.assignment.tables[number].source}: {read.rows.remark}")

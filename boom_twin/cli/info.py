@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable
 from ..types import NANO, StrokeReading
-from .arguments import SESSION, add_json, add_mapping, add_session_scene, add_window, window_of
+from .arguments import SESSION, add_json, add_session, window_of
 from .output import columns, open_session_scene, print_result
 
 if TYPE_CHECKING:
@@ -17,11 +17,8 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help=SESSION)
-    add_session_scene(parser)
-    add_mapping(parser)
-    add_window(parser)
+    add_session(parser, params=False)
     add_json(parser)
 
 
@@ -133,7 +130,6 @@ def _part(info: BagInfo, values: dict[str, Any]) -> str:
 
 
 def _table(info: BagInfo) -> list[str]:
-    """Return a table with one line for each topic."""
     late = ["log - stamp, ms: least", "mean", "most"]
     rows = [["topic", "type", "count", "Hz", "gap, ms", "at s", "not rising", "no stamp", *late]]
     for tally in info.tallies:

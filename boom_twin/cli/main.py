@@ -102,8 +102,7 @@ COLLECT_AFTER = 100_000
 
 DESCRIPTION = "Digital twin of a concrete placing boom."
 EXIT_CODES = "exit codes: 0 done, 1 the input or the run failed (the reason is on stderr), 2 usage"
-COMPLETING = "_ARGCOMPLETE"
-"""Set in the environment by a shell that asks for completions."""
+COMPLETING = "_ARGCOMPLETE"  # set in the environment by a shell that asks for completions
 
 
 class CommandParser(ArgumentParser):
@@ -146,13 +145,7 @@ class Command(Protocol):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return the exit code.
-
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        Arguments without the program's name; by default those of the process, which then has nothing else to do.
-    """
+    """Run one command and return the exit code; without `argv` that of the process, which has nothing else to do."""
     if argv is not None:
         return _main(argv)
     open_closed_streams()
@@ -212,19 +205,14 @@ def _parser(arguments: Sequence[str]) -> ArgumentParser:
     is_completing = COMPLETING in os.environ
     for name, purpose in COMMANDS.items():
         about = purpose[0].upper() + purpose[1:] + "."
-        own = commands.add_parser(name, description=about, epilog=_epilog(name))
+        examples = [f"  boom_twin {example}" for example in EXAMPLES.get(name, ())]
+        own = commands.add_parser(name, description=about, epilog="\n".join(["examples:", *examples] if examples else []))
         own.add_argument("--quiet", action="store_true", help="leave out what is told on the way, but for warnings")
         if is_completing or name in arguments:
             _command(name).add_arguments(own)
     if is_completing:
         _complete(parser)
     return parser
-
-
-def _epilog(command: str) -> str:
-    """Return the lines below the options; a command that `EXAMPLES` lacks has none."""
-    lines = [f"  boom_twin {example}" for example in EXAMPLES.get(command, ())]
-    return "\n".join(["examples:", *lines]) if lines else ""
 
 
 def _complete(parser: ArgumentParser) -> None:

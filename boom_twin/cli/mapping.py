@@ -7,19 +7,16 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .arguments import SESSION, add_json, add_mapping, add_session_scene, add_window, refuse_given, window_of
+from .arguments import SESSION, add_json, add_session, refuse_given, window_of
 
 if TYPE_CHECKING:
     from ..offline.commissioning import Commissioning
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("--check", metavar="BAG", help=f"check how the sensors of a session are wired: {SESSION}")
-    add_session_scene(parser)
-    add_mapping(parser)
+    add_session(parser, params=False)
     parser.add_argument("--out", type=Path, metavar="FILE", help="with --check: write the proposed mapping")
-    add_window(parser)
     add_json(parser)
 
 

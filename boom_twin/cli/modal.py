@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .arguments import add_json, add_mapping, add_params, add_session_scene, add_window, files_of, window_of
+from .arguments import add_json, add_session, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell
 
 if TYPE_CHECKING:
@@ -14,15 +14,11 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help="a recorded session with a rest period of 20 s or more, better two minutes")
     parser.add_argument(
         "--out", required=True, metavar="DIR", help="folder for modes.json and stabilisation diagrams, new or empty"
     )
-    add_session_scene(parser)
-    add_params(parser)
-    add_mapping(parser)
-    add_window(parser)
+    add_session(parser)
     add_json(parser)
 
 
@@ -35,7 +31,7 @@ def run(args: Namespace) -> int:
     from ..calibration.rest_periods import Rigging
     from ..calibration.run import common_mapping, common_reading
     from ..calibration.sessions import read_sessions
-    from ..plots.stabilisation import stabilisation_picture
+    from ..plots.session import stabilisation_picture
     from ..report.operational_modes import measured_rests
     from ..system.atomic_files import write_atomic
     from ..system.result_folder import MODAL, result_folder
@@ -55,8 +51,8 @@ def run(args: Namespace) -> int:
             files.append(f"rest_{number}.png")
             title = f"{session.name}, rest period {rest.start:.1f} to {rest.stop:.1f} s"
             found = np.array([(each.frequency, each.frequency_sigma) for each in rest.modes]).reshape(-1, 2)
-            stabilisation_picture(building.folder / files[-1], title, rest.poles, found, rest.model)
-        write_atomic(building.folder / "modes.json", json.dumps([_as_object(rest) for rest in rests], indent=2) + "\n")
+            stabilisation_picture(building / files[-1], title, rest.poles, found, rest.model)
+        write_atomic(building / "modes.json", json.dumps([_as_object(rest) for rest in rests], indent=2) + "\n")
     print_result(args.json, _flat(rests), [*_as_text(rests), *(str(out / name) for name in files)])
     return 0
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
 from ..monitor import PORT
-from .arguments import add_mapping, add_params, add_ros_args, add_session_scene, add_window, ros_arguments, window_of
+from .arguments import add_ros_args, add_session, ros_arguments, window_of
 from .output import open_scene, open_session_scene, open_session_settings, tell, warn_incomplete
 
 if TYPE_CHECKING:
@@ -21,22 +21,17 @@ if TYPE_CHECKING:
 
 
 ACTS = ("mark", "acknowledge", "acknowledge-at-node", "record")
-NICE = 5
-"""Nice value of the monitor, by which it gives way to the node on the same machine."""
+NICE = 5  # nice value of the monitor, by which it gives way to the node on the same machine
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare which feed is shown, who may open the page, and what viewers may do."""
     parser.add_argument(
         "--bag",
         metavar="BAG",
         type=Path,
         help="a recorded session, the bag of a replay, or a folder of several sessions to choose from (the live topics)",
     )
-    add_session_scene(parser)
-    add_params(parser)
-    add_mapping(parser)
-    add_window(parser)
+    add_session(parser)
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
     token = "the token is the one in FILE, on this machine, too; without it, a new one at each start"
@@ -96,7 +91,6 @@ def _lower_priority() -> None:
 
 
 def _sessions(args: Namespace) -> SessionList:
-    """Return the sessions of ``--bag``, the first one open."""
     from ..bag.reader import scan
     from ..monitor.data.bag_feed import bag_feed
     from ..monitor.data.feed import SessionList, sessions_in
@@ -113,7 +107,6 @@ def _sessions(args: Namespace) -> SessionList:
 
 @contextmanager
 def _live_feed(args: Namespace) -> Iterator[Feed]:
-    """Provide the feed of the live topics within a context."""
     from ..ros.startup import require_rclpy
 
     require_rclpy()
@@ -145,7 +138,7 @@ def _serve(args: Namespace, feed: Feed, actions: Any, sessions: SessionList | No
 async def _run(args: Namespace, server: Any, access: Any) -> None:
     import asyncio
 
-    from ..monitor.serving import serving
+    from ..monitor.server import serving
     from ..ros.startup import stop_signals
 
     stopped = asyncio.Event()

@@ -10,7 +10,7 @@ import tty
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 from tqdm import tqdm
 
@@ -29,7 +29,6 @@ BAR = "{l_bar}{bar}| {n:.1f}/{total:.1f} s"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the session, and how it is played."""
     parser.add_argument("bag", metavar="BAG", type=Path, help="rosbag2 directory, or a file: .mcap, .db3, .bag of ROS 1, .csv")
     parser.add_argument("--rate", type=positive, default=1.0, metavar="R", help="session time over real time (1)")
     parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help="begin so many seconds in (0)")
@@ -120,32 +119,24 @@ def _check_listeners(unmatched: list[str], unheard: list[str], topics: int, args
 
 
 class Keys:
-    """Keys of the terminal within a context; none if stdin is no terminal, or that of another program.
-
-    Leaving the context restores the terminal's settings.
-    """
+    """Keys of the terminal within a context; none if stdin is no terminal, or that of another program."""
 
     def __init__(self) -> None:
-        self._before: list[Any] | None = None
+        self.are_read = False
 
     def __enter__(self) -> Self:
         if _is_ours():
-            self._before = termios.tcgetattr(sys.stdin)
+            self.are_read, self._before = True, termios.tcgetattr(sys.stdin)
             tty.setcbreak(sys.stdin, termios.TCSADRAIN)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if self._before is not None and _is_ours():
+        if self.are_read and _is_ours():
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
-
-    @property
-    def are_read(self) -> bool:
-        """Return True if keys of a terminal are read."""
-        return self._before is not None
 
     def pressed(self) -> str:
         """Return the keys pressed since the last call."""
-        if self._before is None or not _is_ours() or not select.select([sys.stdin], [], [], 0.0)[0]:
+        if not self.are_read or not _is_ours() or not select.select([sys.stdin], [], [], 0.0)[0]:
             return ""
         return os.read(sys.stdin.fileno(), 100).decode(errors="replace")
 

@@ -33,7 +33,6 @@ _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare where to record to, and which topics."""
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="directory of the bag, new or empty")
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--only", choices=["inputs", "outputs"], help="what goes into the twin, or what it publishes (both)")
@@ -151,7 +150,6 @@ def _with_twin_values(sheet: SessionSheet, answers: Mapping[str, Any], frame: st
 
 
 def _tell_counts(counts: list[TopicCount]) -> None:
-    """Print one line for each topic."""
     tell(" received   written  never arrived")
     for count in counts:
         missed = "unknown" if count.missed is None else str(count.missed)
@@ -159,7 +157,6 @@ def _tell_counts(counts: list[TopicCount]) -> None:
 
 
 def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:
-    """Return the topics of the command line, or the chosen ones of the mapping."""
     from ..ros.bag.subscriptions import RequestedTopic, requested_topics
 
     inputs: dict[str, Topic] = {topic.absolute: topic for topic in known.inputs.values()}

@@ -14,12 +14,10 @@ if TYPE_CHECKING:
     from ..bag.recovery.recover import Recovery
 
 
-SHOWN = 20
-"""Faults that are printed one by one."""
+SHOWN = 20  # faults that are printed one by one
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap; only read")
     parser.add_argument("--out", required=True, metavar="DIR", help="directory of the new session, new or empty")
     parser.add_argument(
@@ -56,7 +54,6 @@ def as_json(outcome: Recovery, out: str) -> dict[str, Any]:
         "saved_without_checksum": [outcome.unvouched[topic] for topic in topics],
         "lost": [None if outcome.lost is None else outcome.lost.get(topic, 0) for topic in topics],
         "lost_of_unknown_topics": outcome.nameless,
-        "left_out_as_copies": outcome.copies,
         "faults": outcome.fault_count,
     }
 
@@ -70,8 +67,6 @@ def as_text(outcome: Recovery, values: dict[str, Any]) -> list[str]:
         lines.append(f"{topic:{wide}}  {values['saved'][row]:9d}  {values['saved_without_checksum'][row]:11d}  {lost:>9}")
     if outcome.nameless:
         lines.append(f"{outcome.nameless} sound messages were left out: the definitions of their topics are lost")
-    if outcome.copies:
-        lines.append(f"{outcome.copies} messages were left out: they stand in copies of chunks that were saved")
     if any(values["saved_without_checksum"]):
         lines.append("'no checksum': saved as they stood; nothing vouches for their values")
     if outcome.lost is None:

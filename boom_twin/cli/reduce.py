@@ -36,7 +36,6 @@ MEANING = {
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare ``--need``, and the options that go with it."""
     purpose = "propose the leanest model whose tip stays so near to this scene's (mm, cm, m)"
     parser.add_argument("--need", type=tip_error, metavar="tip=1mm", help=purpose)
     add_file(parser, "--out", "with --need: write the lean scene file here", "LEAN")
@@ -133,7 +132,7 @@ def write(source: str | None, scene: Scene, proposal: Proposal, most: float, out
         f"# ({proposal.course.motion.label}).",
         f"# {ANOTHER}",
     ]
-    body = "\n".join(head) + "\n\n" + rewritten(text, scene, proposal.edits)
+    body = "\n".join(head) + "\n\n" + rewritten(text, scene, proposal.scene)
     write_atomic(out, with_end_mark(body))
 
 
@@ -147,5 +146,4 @@ def _meaning(scene: Scene, edit: Edit) -> str:
 
 
 def _length(value: float) -> str:
-    """Return a length in mm, with three digits."""
     return f"{1e3 * value:.3g} mm"

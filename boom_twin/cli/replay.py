@@ -10,34 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 from ..offline.progress import progress_of
 from ..types import StrokeReading
-from .arguments import (
-    SESSION,
-    add_json,
-    add_mapping,
-    add_namespace,
-    add_params,
-    add_session_scene,
-    add_window,
-    files_of,
-    refuse_given,
-    window_of,
-)
+from .arguments import SESSION, add_json, add_namespace, add_session, files_of, refuse_given, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell, warn_incomplete
 
 if TYPE_CHECKING:
     from ..offline.recording import Stretch
+    from ..offline.sample_table import CsvFile, ParquetFile
     from ..report.evaluation import Evaluation
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help=SESSION)
-    add_session_scene(parser)
-    add_window(parser)
+    add_session(parser)
     place = "folder for summary.json, bag/, tables and pictures: new, empty, or of an earlier replay, which is replaced"
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
-    add_params(parser)
-    add_mapping(parser)
     add_namespace(parser, "ROS namespace of the node in the session, for topics and --params")
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
@@ -64,7 +50,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Replay, draw, and print the result."""
     from ..offline.inputs import ReplayOptions
-    from ..offline.sample_table import SampleTable, check_kind, table_file
+    from ..offline.sample_table import SampleTable, check_kind, columns_of, table_file
     from ..report.evaluation import evaluated_replay
     from ..report.quantities import section_heights
     from ..system.result_folder import REPLAY, result_folder
@@ -82,13 +68,13 @@ def run(args: Namespace) -> int:
     out, sources = Path(args.out), files_of(args, "bag", "scene", "params", "mapping")
     with result_folder(out, REPLAY, sources) as building:
         joints, name = len(scene.scene.joints), f"samples.{args.table}"
-        table: SampleTable | None = None
+        tables: list[tuple[CsvFile | ParquetFile, SampleTable]] = []
 
         def add(stretch: Stretch) -> None:
-            nonlocal table
-            if table is None:  # the sensors of a session are known with its first stretch
-                table = SampleTable(partial(table_file, building.folder / name), joints, stretch.streams)
-            table.add(stretch)
+            if not tables:  # the sensors of a session are known with its first stretch
+                file = table_file(building / name, columns_of(joints, stretch.streams))
+                tables.append((file, SampleTable(file.write, joints, stretch.streams)))
+            tables[0][1].add(stretch)
 
         options = ReplayOptions(
             progress=partial(progress_of, unit="messages", name="replay"),
@@ -103,9 +89,10 @@ def run(args: Namespace) -> int:
         found = evaluated_replay(
             building, args.bag, scene, settings, options, heights, args.fatigue, add if args.table else None
         )
-        files = [path.name for path in _write(args, found, building.folder)]
-        if table is not None:
+        files = [path.name for path in _write(args, found, building)]
+        for file, table in tables:
             table.finish()
+            file.close()
             files.append(name)
     warn_incomplete(found.result.session)
     written = ["summary.json", *([] if args.no_bag else ["bag"]), *files]
@@ -123,7 +110,6 @@ def flat(summary: dict[str, Any]) -> dict[str, Any]:
 
 
 def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
-    """Write pictures and report, as they are wanted; return these files and the file of the figures."""
     from ..offline.history import draw
     from ..report.page import write_report
 
@@ -156,7 +142,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         ratio = hypot(summary["joint_residual_normalised_mean"][i], summary["joint_residual_normalised_std"][i])
         lines.append(f"joint {i + 1} residual   {1e3 * value:.3f} mrad rms, {ratio:.1f} times the expected noise")
     for name, count in summary["events"].items():
-        lines.append(f"{name:18s} {count_as_text(name, count)}")
+        lines.append(f"{name:18s} {count_as_text(name, count, StrokeReading(summary['strokes']))}")
     if "tip_error_rms_m" in summary:
         lines += _errors(summary)
     if "tip_load" in summary:
@@ -168,17 +154,16 @@ def as_text(summary: dict[str, Any]) -> list[str]:
     return [*lines, f"alarms             {len(alarms) or 'none'}", *(f"  {alarm_as_text(alarm)}" for alarm in alarms)]
 
 
-def count_as_text(name: str, count: int) -> str:
+def count_as_text(name: str, count: int, reads: StrokeReading) -> str:
     """Return in words how often an irregularity was met."""
     from ..messages.sample_decoder import ODDITIES
-    from ..twin.events import EVENTS
+    from ..twin.events import event_meaning
 
-    meaning = (EVENTS | ODDITIES).get(name, "").partition(";")[0]
+    meaning = (event_meaning(name, reads) or ODDITIES.get(name, "")).partition(";")[0]
     return f"{count} time{'' if count == 1 else 's'}" + (f": {meaning}" if meaning else "")
 
 
 def _errors(summary: dict[str, Any]) -> list[str]:
-    """Return lines on the errors against the truth, of the prediction and of the estimate."""
     lines = [
         f"tip error          {1e3 * summary['tip_error_rms_m']:.2f} mm rms against the truth",
         f"acceleration error {summary['tip_acceleration_error_rms_m_s2']:.3f} m/s^2 rms against the truth",

@@ -42,7 +42,6 @@ class Answer:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     add_scene(parser)
     swept = (
         "resonance map over these postures (angles in brackets), or `all` of the scene's; needs --pump, whose rate it varies"
@@ -65,7 +64,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def _pump(text: str) -> tuple[float, ...]:
-    """Parse two or three numbers between colons."""
     try:
         result = tuple(float(part) for part in text.split(":"))
     except ValueError:
@@ -76,7 +74,6 @@ def _pump(text: str) -> tuple[float, ...]:
 
 
 def _rates(text: str) -> tuple[float, float, int]:
-    """Parse lowest rate, highest rate (Hz) and number of rates."""
     try:
         low, high, count = text.split(":")
         result = float(low), float(high), int(count)
@@ -106,15 +103,14 @@ def run(args: Namespace) -> int:
         warn(f"{doubt}.")
     if args.out:
         with result_folder(Path(args.out), RESPONSE, files_of(args, "scene", "load")) as building:
-            write_atomic(building.folder / f"{answer.name}.csv", columns_text(answer.columns))
-            answer.draw(building.folder / f"{answer.name}.png")
+            write_atomic(building / f"{answer.name}.csv", columns_text(answer.columns))
+            answer.draw(building / f"{answer.name}.png")
         answer.lines.append(f"Written: {args.out}")
     print_result(args.json, answer.values | {"warnings": answer.doubts}, answer.lines)
     return 0
 
 
 def _check_options(args: Namespace) -> None:
-    """Raise UsageError for options that would be ignored."""
     grid = {"--from": args.low != LOW, "--to": args.high != HIGH, "--points": args.points != POINTS}
     mapped = {"--rates": args.rates != RATES, "--steps": args.steps != STEPS}
     is_map = args.map is not None
@@ -183,7 +179,6 @@ def _undamped(frequencies: Array) -> tuple[str, ...]:
 
 
 def _resonances(result: FrequencyResponse, static: FrequencyResponse, natural: Array, bounded: Flags) -> list[str]:
-    """Return a line for the static limit and for every natural frequency."""
     lines = ["frequency Hz   tip x m     tip y m     acceleration m/s2   largest cylinder force N   largest moment N m"]
     rows = [(0.0, static, 0)] + [(f, result, int(np.searchsorted(result.frequencies, f))) for f in natural[bounded]]
     for frequency, response, k in rows:

@@ -16,7 +16,6 @@ from .output import tell, tell_oddities
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     add_scene(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the bag and its truth, new or empty")
     moves = parser.add_mutually_exclusive_group()
@@ -70,7 +69,6 @@ class ListFaults(Action):
 
 
 def _refuse_unrecorded(causes: list[str], recorded: set[str]) -> None:
-    """Raise UsageError if a fault is of a sensor that is not recorded."""
     for cause in causes:
         for stem, sensors in (("joint_", "angles"), ("cylinder_force_", "forces")):
             if cause.startswith(stem) and sensors not in recorded:
@@ -177,11 +175,11 @@ def run(args: Namespace) -> int:
         joints, imu, forces = (values if name in recorded else None for name, values in readings.items())
         placed = {stream: rows for stream, rows in session.placed.items() if stream is not Stream.RATE or "gyro" in recorded}
         given = session.stamps, session.strokes, joints, imu, notes, session.angle_stamps, forces, placed
-        write_session(building.folder, *given)
+        write_session(building, *given)
         # not the boom that was simulated: what a twin is to assume
         own = _mapping_text(places, cylinders)
         sheet = SessionSheet(__version__, assumed.text, mapping=own, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)
-        sheet.write(building.folder)
-        session.save_truth(building.folder / FILE_NAME)
+        sheet.write(building)
+        session.save_truth(building / FILE_NAME)
     print(out)
     return 0

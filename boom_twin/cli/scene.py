@@ -9,7 +9,6 @@ from ..scene.load import clearance_text, default_text, example_names, example_te
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--clearance", action="store_true", help="with play in the pins between rods and boom")
     which.add_argument("--example", metavar="NAME", choices=example_names(), help=f"another boom: {', '.join(example_names())}")

@@ -32,7 +32,6 @@ SPARSE_ROWS = 1.0  # s between rows, above which a warning comes
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     add_scene(parser)
     purpose = "the posture that the first row must be in: a name, or section angles, deg; else it may be any"
     parser.add_argument("--posture", metavar="NAME", help=purpose)
@@ -64,7 +63,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def _share(text: str) -> float:
-    """Parse a number from 0 to 1."""
     if (value := not_negative(text)) > 1.0:
         raise ArgumentTypeError(f"{text}: must be at most 1")
     return value
@@ -117,7 +115,6 @@ def run(args: Namespace) -> int:
 
 
 def _check_targets(targets: dict[str, str | None]) -> None:
-    """Raise UsageError if two options would write the same file."""
     seen: dict[Path, str] = {}
     for option, target in targets.items():
         if target and seen.setdefault(Path(target).resolve(), option) != option:
@@ -125,7 +122,6 @@ def _check_targets(targets: dict[str, str | None]) -> None:
 
 
 def _check_sampling(args: Namespace) -> None:
-    """Raise UsageError for options that do not go with ``--samples``, or only with it."""
     if args.samples is None:
         refuse_given(args, "goes with --samples N. Add it, or leave --vary out.", "vary")
         return
@@ -135,7 +131,6 @@ def _check_sampling(args: Namespace) -> None:
 
 
 def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles: Array | None, force: Array | None) -> int:
-    """Simulate many booms; write their statistics and the samples."""
     from ..analysis.monte_carlo import simulate_samples
     from ..offline.progress import progress_of
 
@@ -252,14 +247,9 @@ def _is_earlier(start: bytes) -> bool:
 
 
 def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array, str]:
-    """Return times (m,) in s, strokes or lengths (m, n) in m, and their column stem (``stroke``) from a CSV file.
+    """Return times (m,) in s, strokes or lengths (m, n) in m, and their column stem from a CSV file.
 
-    The stem is the first of `stems` in the header.
-
-    Raises
-    ------
-    UsageError
-        The file cannot be read, has another header, no rows, or a value that is no number.
+    UsageError for another file. The stem is the first of `stems` in the header.
     """
     table = read_csv(path, UsageError)
     stem = next((stem for stem in stems if f"{stem}_1_m" in table.names), stems[0])
@@ -268,7 +258,6 @@ def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array
 
 
 def _columns(table: CsvTable, names: Sequence[str]) -> Array:
-    """Return columns of a table, shape (rows, len(names)); UsageError if one is missing or holds no number."""
     table.require(names)
     return np.column_stack([table.column(name) for name in names])
 

@@ -19,7 +19,6 @@ KINDS: dict[str, tuple[str, str]] = {
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare a parser for every kind."""
     kinds = parser.add_subparsers(dest="kind", metavar="KIND", required=True)
     for name, (_, purpose) in KINDS.items():
         own = kinds.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")
@@ -40,7 +39,7 @@ def run(args: Namespace) -> int:
     options = {"soak": True} if getattr(args, "soak", False) else {}
     scene, out = open_scene(args.scene), Path(args.out)
     with result_folder(out, study(args.kind), files_of(args, "scene")) as building:
-        written = write(scene, building.folder, quick=args.quick, posture=args.posture, **options)
+        written = write(scene, building, quick=args.quick, posture=args.posture, **options)
     for path in written:
         print(out / path.name)
     return 0

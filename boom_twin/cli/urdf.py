@@ -10,7 +10,6 @@ from .output import open_scene
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the scene."""
     add_scene(parser)
 
 

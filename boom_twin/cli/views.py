@@ -11,7 +11,6 @@ from .arguments import add_namespace
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare where to write, and for which boom."""
     parser.add_argument(
         "--out", metavar="DIR", type=Path, required=True, help="folder for the three files; none is written over"
     )

@@ -12,7 +12,6 @@ from .output import print_result, tell
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     purpose = "remove the compiled kernels of all versions; the next command that needs them compiles anew"
     parser.add_argument("--remove", action="store_true", help=purpose)
 
@@ -47,5 +46,4 @@ def run(args: Namespace) -> int:
 
 
 def _size(folder: Path) -> float:
-    """Return the size of all files of a folder, MB."""
     return sum(each.stat().st_size for each in folder.iterdir()) / 1e6

@@ -89,7 +89,6 @@ class _Builder:
     # -- joints ---------------------------------------------------------------------------------------------------
 
     def joint(self, index: int) -> None:
-        """Joint `index` with its links and its cylinder."""
         joint, n = self.scene.joints[index], index + 1
         self.layout.add("linkages", **_fields(linkage(self.scene, index)))
         if joint.kind == "A":
@@ -243,7 +242,6 @@ class _Builder:
         self.layout.operate(program.BODY, row)
 
     def _beam(self, index: int, length: float) -> None:
-        """A flexible part of section `index`."""
         section, n = self.scene.sections[index], self.scene.modes_of(index)
         assert section.A is not None and section.I is not None and section.rho_A is not None
         points, basis, share, integrals = _shapes(self.basis, n)
@@ -279,7 +277,6 @@ class _Builder:
     # -- bookkeeping ----------------------------------------------------------------------------------------------
 
     def _point(self, mass: float, inertia: float) -> int:
-        """Histories x, y, angle of a mass."""
         return self.layout.histories([mass, mass, inertia], [mass * self.gravity[0], mass * self.gravity[1], 0.0])
 
     def _mark_frame(self) -> None:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..kernels.elements import pin_contact as contact
-from ..kernels.elements.beam import LOCAL_ROWS, TURN_ROWS
+from ..kernels.elements.beam import TURN_ROWS
+from ..kernels.elements.beam_equations import LOCAL_ROWS
 from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.integrators import DEPTH, new_weights
 from ..kernels.result_row import Results, results_of, row_width
@@ -31,27 +32,24 @@ class Layout:
     weights: list[float] = field(default_factory=list)
 
     def add(self, table: str, **values: Any) -> int:
-        """Append a row; returns its index."""
         self.rows[table].append(values)
         return len(self.rows[table]) - 1
 
     def operate(self, kind: int, row: int) -> None:
-        """Append an operation along the chain."""
         self.add("operations", kind=kind, row=row)
 
     def unknowns(self, names: list[str]) -> int:
-        """Places for unknowns of these names; returns the first."""
+        """Reserve unknowns of these names; return the place of the first."""
         self.names.extend(names)
         return len(self.names) - len(names)
 
     def histories(self, masses: list[float], weights: list[float]) -> int:
-        """Places for histories of mass points, counted from the first one behind the unknowns; returns the first."""
+        """Reserve histories of mass points; return the place of the first, counted from behind the unknowns."""
         self.masses.extend(masses)
         self.weights.extend(weights)
         return len(self.masses) - len(masses)
 
     def table(self, name: str) -> np.recarray:
-        """The finished table, possibly of length 0."""
         rows = np.zeros(len(self.rows[name]), RECORDS[name])
         for i, values in enumerate(self.rows[name]):
             for key, value in values.items():
@@ -64,31 +62,15 @@ LOOP = 11 + 8 + SLOTS - 3  # most rows of the system of a six-bar: see `kernels.
 
 @dataclass(frozen=True)
 class Plan:
-    """A compiled boom.
+    """A compiled boom."""
 
-    Attributes
-    ----------
-    tables : Tables
-        What the kernels read.
-    names : tuple of str
-        The unknowns, in order.
-    masses, weights : ndarray, shape (histories,)
-        Inertia of every history (kg, kg m^2; 0 for those of unknowns) and weight along it (N).
-    outline : ndarray of int, shape (k, 2)
-        Points of the centre line, base to tip: (0, row of frames) or (1, place of x among the histories).
-    closed_lengths : ndarray, shape (n,)
-        Of the cylinders, m.
-    pins : tuple of str
-        Pins with clearance, in the order of `tables.clearances`.
-    """
-
-    tables: Tables
-    names: tuple[str, ...]
-    masses: Array
-    weights: Array
-    outline: np.ndarray
-    closed_lengths: Array
-    pins: tuple[str, ...] = ()
+    tables: Tables  # what the kernels read
+    names: tuple[str, ...]  # the unknowns, in order
+    masses: Array  # (histories,), inertia, kg, kg m^2; 0 for those of unknowns
+    weights: Array  # (histories,), weight along each, N
+    outline: np.ndarray  # (k, 2), centre line, base to tip: (0, row of frames) or (1, place of x among the histories)
+    closed_lengths: Array  # (n,), of the cylinders, m
+    pins: tuple[str, ...] = ()  # pins with clearance, in the order of `tables.clearances`
 
     @property
     def joints(self) -> int:

@@ -13,7 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from ..errors import UsageError
-from ..types import SensorKind, StrokeReading
+from ..sensor_kinds import SensorKind
+from ..types import StrokeReading
 from .yaml_text import read_plain
 
 Table = TypeVar("Table", bound=BaseModel)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -38,6 +38,8 @@ IMU_ZERO, IMU_DRIFT = 0.3, 3e-3  # m/s^2; m/s^2 in a root second
 IMU_TURN, IMU_SCALE = 0.1, 0.1  # rad, by which it may be mounted askew; share by which it may read too much
 RATE_ZERO, RATE_DRIFT = 0.02, 1e-4  # rad/s; rad/s in a root second
 POINT_ZERO, POINT_DRIFT = 1e-3, 1e-5  # m; m in a root second: of a prism, and of the model's statics
+LAG_FIRST, LAG_WALK = 0.03, 3e-5  # s; s in a root second: of a driver whose load changes
+DRIFT_FIRST, DRIFT_WALK = 5e-5, 1e-7  # of a quartz clock; in a root second, by its temperature
 SAME_PLACE = 1e-9  # m
 
 CHANNEL = np.dtype(
@@ -50,6 +52,7 @@ CHANNEL = np.dtype(
         ("zero", np.int64),  # place of its zero among the states behind those of the prediction
         ("last", np.int64),  # place there of the last state that its reading depends on: an IMU's scale, behind its mount
         ("noise2", float),  # variance of its noise
+        ("lag", np.int64),  # place there of the lag of its stream, behind which stands its drift; -1 without
     ]
 )
 
@@ -62,7 +65,13 @@ SITE = np.dtype(
     ]
 )
 
-ERROR = np.dtype([("first", float), ("walk", float)])  # standard deviations: at first, and of the walk in a root second
+ERROR = np.dtype(
+    [
+        ("first", float),  # standard deviation at first
+        ("walk", float),  # standard deviation of the walk in a root second
+        ("drifts", np.bool_),  # its rate is the state behind
+    ]
+)
 
 
 class Measurement(NamedTuple):
@@ -171,15 +180,23 @@ def write_expected_readings(p, f, live, results, h, values, sigmas):
         sigmas[c] = math.sqrt(noise2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
 
 
-def measurement_of(plan: Plan, settings: Settings, mounting: Mounting, places: Mapping[str, Place]) -> Measurement:
+def measurement_of(
+    plan: Plan,
+    settings: Settings,
+    mounting: Mounting,
+    places: Mapping[str, Place],
+    lagging: Collection[Stream] = (),
+) -> Measurement:
     """Return the measured channels of a boom whose angle sensors have this mounting and others these places, by their names.
+
+    The lag and the drift of `lagging` streams are states.
 
     Raises
     ------
     UsageError
         A place is not on the boom.
     """
-    sites, rows, errors = _Sites(plan), list[tuple[float, ...]](), list[tuple[float, float]]()
+    sites, rows, errors = _Sites(plan), list[tuple[float, ...]](), list[tuple[float, float, bool]]()
     bending = list[Array]()
     n, codes = plan.joints, {stream: code for code, stream in enumerate(Stream)}
     for stream, names in channels_of(n, streams_of(places)).items():
@@ -201,15 +218,15 @@ def measurement_of(plan: Plan, settings: Settings, mounting: Mounting, places: M
                 (codes[stream], READS_ACCELERATION, i, site, place.turned, first + i, last, noise2) for i in range(len(names))
             ]
             if stream is not Stream.IMU:
-                errors += [(IMU_ZERO, IMU_DRIFT), (IMU_ZERO, IMU_DRIFT), (IMU_TURN, 0.0), (IMU_SCALE, 0.0)]
+                errors += [(IMU_ZERO, IMU_DRIFT, False)] * 2 + [(IMU_TURN, 0.0, False), (IMU_SCALE, 0.0, False)]
         elif names and kind.field == "angular_velocity":
             place = places.get(kind.stem, Place())
             rows.append((codes[stream], READS_RATE, 0, sites.of(place, kind.stem), place.turned, behind, behind, noise2))
-            errors.append((RATE_ZERO, RATE_DRIFT))
+            errors.append((RATE_ZERO, RATE_DRIFT, False))
         elif names and kind.field == "point":
             site = sites.of(places[kind.stem], kind.stem)
             rows += [(codes[stream], READS_COORDINATE, i, site, 0.0, behind + i, behind + i, noise2) for i in range(len(names))]
-            errors += [(POINT_ZERO, POINT_DRIFT)] * len(names)
+            errors += [(POINT_ZERO, POINT_DRIFT, False)] * len(names)
         elif stream is Stream.MOMENTS:
             for section, name in enumerate(names, start=1):
                 if name not in places:
@@ -218,7 +235,14 @@ def measurement_of(plan: Plan, settings: Settings, mounting: Mounting, places: M
                 place, at = places[name], TIP_IMU_STATES + 2 * n + len(errors)
                 bending.append(sites.bending(replace(place, section=place.section or section), name))
                 rows.append((codes[stream], READS_MOMENT, len(bending) - 1, 0, 0.0, at, at, noise2))
-                errors.append((np.inf, 0.0))  # by the moment that is there, see `BoomPredictor.start`
+                errors.append((np.inf, 0.0, False))  # by the moment that is there, see `BoomPredictor.start`
+    lags = dict[Stream, int]()
+    for stream in lagging:
+        lags[stream] = TIP_IMU_STATES + 2 * n + len(errors)
+        errors += [(LAG_FIRST, LAG_WALK, True), (DRIFT_FIRST, DRIFT_WALK, False)]
+    streams = list(Stream)
+    lag_of = {code: lags.get(Stream(SENSORS[stream].beside or stream), -1) for code, stream in enumerate(streams)}
+    rows = [(*row, lag_of[int(row[0])]) for row in rows]
     stations = np.array(bending).reshape(-1, len(plan.names))
     tables = _table(rows, CHANNEL), _table([row for row, _ in sites.found], SITE), _table(errors, ERROR)
     return Measurement(*tables, *sites.shapes(), stations)

@@ -27,6 +27,7 @@ def put_weight(f, row, place, weight):
 def make_transition(p, f, h):
     """Write the transition over `h` (s), inputs of the modes held, and the variances that the drives gain; loads follow."""
     n, m, load, drive = p.drives.shape[0], p.modes[0], force_place(p), drive_place(p)
+    f.interval[1] = h
     for k in range(all_states(p)):
         f.counts[k], f.variances[k] = 0, 0.0
     for j in range(m):
@@ -78,6 +79,8 @@ def make_transition(p, f, h):
     for k in range(further, p.behind[0]):
         walk = p.errors[k - further].walk
         f.variances[zero + k] = f.drift[k] * walk * walk * h
+        if p.errors[k - further].drifts:
+            put_weight(f, zero + k, zero + k + 1, h)
 
 
 @inner

@@ -12,6 +12,7 @@ from .states import ALL_OPEN, ALL_VALVES, BURST, ESTIMATE, FED, OPEN, PREDICTION
 LEARN_LOAD = 3.0  # s, in which the size of the fast load is learnt
 SURPRISE = 9.0  # times its variance: most that one sample counts for in that
 LEAST_JERK, MOST_JERK = 1e-3, 10.0  # m^2/s^5
+OPENING = 0.5  # m/s^2, by which a valve that opens may accelerate the tip: standard deviation
 JERK_RISE, JERK_FALL = 0.05, 0.5  # s, in which that density is learnt
 OPENED, SHUT = 4.0, 3.0  # standard deviations of a drive's rate: beyond the one it moves, below the other it may stand still
 SHUT_TIME = 0.15  # s below the second before its valve is believed closed
@@ -42,9 +43,16 @@ def watch_valves(p, f, h, size):
 
 @inner
 def learn_jerk(p, f, h):
-    """Learn the jerk density of the drives' accelerations: a variance of 2/T (E a^2) is stationary under that density."""
+    """Learn the jerk density of the drives' accelerations: a variance of 2/T (E a^2) is stationary under that density.
+
+    Behind a closed valve it is that of a valve that opens. A smaller one takes the start of a quick move for a load.
+    """
     n = p.drives.shape[0]
     for i in range(n):
+        if f.is_open[i] == 0:
+            reach2 = p.readings[2 + i, n] ** 2 + p.readings[2 + i, n + 1] ** 2
+            f.jerk[i] = min(2.0 / DRIVE_TIME * OPENING * OPENING / max(reach2, 1e-9), MOST_JERK)
+            continue
         at = drive_place(p) + 2 * n + i
         shown = 2.0 / DRIVE_TIME * (f.x[OPEN, at] * f.x[OPEN, at] + f.p[OPEN, at, at])
         time = JERK_RISE if shown > f.jerk[i] else JERK_FALL

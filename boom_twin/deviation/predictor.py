@@ -27,8 +27,8 @@ from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes, strokes_of_angles
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
-from ..types import GIVE, NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading, channels_of, streams_of
-from .channels import READS_MOMENT, TIP_IMU_STATES, measurement_of
+from ..types import GIVE, NO_PLACES, SENSORS, Array, Clock, Mount, Place, Stream, StrokeReading, channels_of, streams_of
+from .channels import DRIFT_FIRST, LAG_FIRST, READS_MOMENT, TIP_IMU_STATES, measurement_of
 from .estimate_row import MODES
 from .kalman import FORCE_DRIFT, FORCE_ZERO
 from .models import start_models
@@ -89,6 +89,8 @@ class BoomPredictor:
         What drives the model.
     places : mapping of str to Place
         Of sensors that have one, such as ``imu_2``. The tip IMU is at the tip if it is not among them.
+    lagging : collection of Stream
+        Streams whose lag behind what drives the model is estimated.
 
     Attributes
     ----------
@@ -113,6 +115,7 @@ class BoomPredictor:
         mounts: Sequence[Mount | None] = (),
         reads: StrokeReading = StrokeReading.LENGTH,
         places: Mapping[str, Place] = NO_PLACES,
+        lagging: Collection[Stream] = (),
     ) -> None:
         self._scene, self.plan = scene, compile_scene(scene)
         self.live: State = self.plan.state()
@@ -124,7 +127,7 @@ class BoomPredictor:
         lengths, self._reads = np.array([each.length for each in scene.sections]), reads
         self.channels = channels_of(n, streams_of(places))
         mounting = mounting_of(self.plan, mounts)
-        measured = measurement_of(self.plan, settings, mounting, places)
+        measured = measurement_of(self.plan, settings, mounting, places, lagging)
         self.posture = new_posture(self.plan, MODES, lengths, mounting, measured, reads, scene.base.inclination)
         sizes = (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)
         noise = SensorNoise(settings.variance(SENSORS[reads.stream]), *(size * weight for size in sizes))
@@ -137,11 +140,6 @@ class BoomPredictor:
     def held(self) -> tuple[Any, ...]:
         """Fields of `compiled` as compiled code takes them with every call, see `boom_twin.kernels.jit.hold`."""
         return tuple(map(hold, self.compiled))
-
-    @cached_property
-    def filters_held(self) -> tuple[Any, ...]:
-        """Posture and filters as compiled code takes them, see `held`."""
-        return hold(self.posture), hold(self.filters)
 
     @property
     def stations(self) -> int:
@@ -311,6 +309,17 @@ class BoomPredictor:
         """Return the estimated zeros of these sensors, in their units, and their variances, in the order of the states."""
         places = zero_place(self.posture) + np.array(self._zeros_of(channels))
         return self.filters.mean[ESTIMATE, places], self.filters.spread[ESTIMATE, places, places]
+
+    @property
+    def clocks(self) -> dict[Stream, Clock]:
+        """Lags and drifts of the lagging streams, as estimated."""
+        f, found, zero, streams = self.filters, dict[Stream, Clock](), zero_place(self.posture), tuple(Stream)
+        for row in self.posture.channels[self.posture.channels.lag >= 0]:
+            lag, is_there = zero + int(row.lag), self.posture.behind[0] > row.lag and f.status[FED] == 1
+            sigmas = np.sqrt(f.spread[ESTIMATE].diagonal()[lag : lag + 2]) if is_there else (LAG_FIRST, DRIFT_FIRST)
+            numbers = f.lags[row.stream] + f.mean[ESTIMATE, lag], sigmas[0], f.mean[ESTIMATE, lag + 1], sigmas[1]
+            found.setdefault(streams[row.stream], Clock(*map(float, numbers)))
+        return {stream: clock for stream, clock in found.items() if not SENSORS[stream].beside}
 
     def _zeros_of(self, channels: Collection[str]) -> list[int]:
         """Return the places of the zeros of these sensors among those of all."""

@@ -9,7 +9,7 @@ from .channels import READS_ACCELERATION, READS_ANGLE, READS_COORDINATE, READS_R
 from .kalman import ANGLE_ZERO, correct
 from .learning import SURPRISE
 from .mixture import mix, weigh_models
-from .rows import SWAY_SHARE, variance_of
+from .rows import SWAY_SHARE, clear, read, variance_of
 from .states import ALL_OPEN, ALL_VALVES, ESTIMATE, FED, FED_STAMP, PREDICTION, all_states, drive_place, zero_place
 
 INEXACT = 0.03  # share of the tip's acceleration that modes left out and those there are wrong by
@@ -18,6 +18,7 @@ LEARN_RATIO = 0.005  # of a reading, by which the size of its channel's normalis
 DOF = 4.0  # degrees of freedom of Student's t, by which innovations of the estimate are weighed
 SLOW = 5_000_000_000  # ns for which the position of a point keeps the estimate, beyond other readings
 OLDEST = 0.1  # s, most that a reading may be late
+CLEAR_RATE = 3.0  # standard deviations from zero of a rate that tells of a lag
 
 
 @kernel
@@ -36,7 +37,7 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         Of the sample, and of the newest lengths, ns.
     """
     age = (newest - stamp) * 1e-9
-    last, usable = first, False
+    last, usable, lag = first, False, p.channels[first].lag
     while last < p.channels.shape[0] and p.channels[last].stream == stream:
         usable |= math.isfinite(residuals[last - first]) and not f.masked[last]
         last += 1
@@ -50,7 +51,7 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         if f.masked[c] or not math.isfinite(residual):
             continue
         channel = p.channels[c]
-        admit_errors(p, f, channel.last + 1)
+        admit_errors(p, f, max(channel.last, lag + 1) + 1)
         measurement_row(p, f, c, f.row)
         variance = channel.noise2
         if channel.kind == READS_ACCELERATION:
@@ -59,11 +60,15 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
             variance += INEXACT * INEXACT * f.shaking[channel.site, 1]
         elif channel.kind == READS_ANGLE:
             variance += SWAY_SHARE * SWAY_SHARE * f.sway2[channel.index]
+        if lag >= 0:
+            variance += add_lag(p, f, lag, f.row)
         take_reading(p, f, c, residual, variance, age)
         if channel.kind == READS_ANGLE and f.deaf[channel.index]:
             replace_length(p, f, c, residual)
     weigh_models(f, ESTIMATE)
     mix(f, ESTIMATE, all_states(p))
+    if lag >= 0:
+        correct_stamps(p, f, lag)
 
 
 @inner
@@ -77,6 +82,42 @@ def admit_errors(p, f, count):
             for i in range(at + 1):
                 f.p[k, i, at] = f.p[k, at, i] = 0.0
             f.p[k, at, at] = p.errors[at - zero - TIP_IMU_STATES - 2 * p.drives.shape[0]].first ** 2
+
+
+@inner
+def add_lag(p, f, lag, row):
+    """Add the column of a stream's lag to a row: minus the rate of the reading. Return the variance of what it leaves out.
+
+    A rate that may be zero tells nothing of the lag; the lag is then noise.
+    """
+    size, at, rates, h = zero_place(p), zero_place(p) + lag, f.rows[2], f.interval[1]
+    if h == 0.0:
+        return 0.0
+    clear(rates, all_states(p))
+    for i in range(size):
+        if row[i] != 0.0:
+            rates[i] -= row[i] / h
+            for c in range(f.counts[i]):
+                rates[f.places[i, c]] += row[i] / h * f.weights[i, c]
+    rate, variance = read(rates, f.mean[ESTIMATE], size), variance_of(rates, f.spread[ESTIMATE], f.gain, size)
+    if rate * rate > CLEAR_RATE * CLEAR_RATE * variance:
+        row[at] = -rate
+    else:
+        variance += rate * rate
+    return variance * f.spread[ESTIMATE, at, at]
+
+
+@inner
+def correct_stamps(p, f, lag):
+    """Move the estimate of a lag to the stamps of its streams, so that rows are linear about it."""
+    at = zero_place(p) + lag
+    change = f.mean[ESTIMATE, at]
+    for k in range(ALL_VALVES, ALL_OPEN + 1):
+        f.x[k, at] -= change
+    f.mean[ESTIMATE, at] = 0.0
+    for c in range(p.channels.shape[0]):
+        if p.channels[c].lag == lag and (c == 0 or p.channels[c].stream != p.channels[c - 1].stream):
+            f.lags[p.channels[c].stream] += change
 
 
 @inner

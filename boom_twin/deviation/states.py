@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.jit import by_reference, inner
-from ..types import Array
+from ..types import Array, Stream
 
 if TYPE_CHECKING:
     from .channels import Measurement
@@ -44,7 +44,8 @@ class Filters(NamedTuple):
     masked, deaf : (c,), (n,) measured channels that the estimate, and strokes that no model is to use. noise : variances.
     excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
     drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
-    m^2. before, interval : (n, 3), (1,) the three lengths before (m), and the time between the newest two, s.
+    m^2. before, interval : (n, 3), (2,) the three lengths before (m); times between the newest two, and of `weights`, s.
+    lags : (streams,) by which stamps are late, as estimated, s.
     bends : (sites, 2) accelerations that the curved ways of sites need, m/s^2. sway2 : (n,) square of the largest angle by
     which an inclinometer lately erred, rad^2.
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
@@ -78,6 +79,7 @@ class Filters(NamedTuple):
     interval: Array
     bends: Array
     sway2: Array
+    lags: Array
     noise: SensorNoise
     places: NDArray[np.int64]
     weights: Array
@@ -110,8 +112,8 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
         still=np.zeros(n), status=np.zeros(2, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
-        length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(1), bends=np.zeros((sites, 2)),
-        sway2=np.zeros(n), noise=noise,
+        length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
+        sway2=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,
         places=np.zeros((states, 8 + n), np.int64), weights=np.zeros((states, 8 + n)), counts=np.zeros(states, np.int64),
         variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
         half=np.zeros((states, states)), turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)),

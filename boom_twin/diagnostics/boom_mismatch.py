@@ -10,12 +10,9 @@ import numpy as np
 from ..health.wiring_monitor import KIND as WIRING
 from ..types import Array, Health, Report, Sample, Stream
 
-JUDGED_TIME = 5_000_000_000
-"""Window (ns) of the test."""
-FEWEST_RESIDUALS = 10
-"""Least number of a joint's residuals in the window."""
-LARGEST_RESIDUAL = radians(10.0)
-"""Largest residual by sag, load, wrong stiffness, and most encoders' zeros."""
+JUDGED_TIME = 5_000_000_000  # window (ns) of the test
+FEWEST_RESIDUALS = 10  # least number of a joint's residuals in the window
+LARGEST_RESIDUAL = radians(10.0)  # largest residual by sag, load, wrong stiffness, and most encoders' zeros
 
 
 class OtherBoom:
@@ -24,15 +21,10 @@ class OtherBoom:
     The test uses the first window in which the readings of most encoders change. A constant encoder may be dead and is not
     used. A single large residual may be an encoder fault. If more than half are large, the scene is wrong. The test is made
     once, because a later difference is a fault of the rig. It is not made if health reports wrong wiring.
-
-    Attributes
-    ----------
-    is_judged : bool
-        True after the test: no more samples are needed.
     """
 
     def __init__(self) -> None:
-        self.is_judged = False
+        self.is_judged = False  # True after the test: no more samples are needed
         self._begin = 0
         self._values: list[Array] = []
         self._residuals: list[Array] = []

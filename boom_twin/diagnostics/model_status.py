@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Mapping
 from math import nan
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -19,11 +20,14 @@ from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
 from .levels import Bounds, ComponentJudge, Level, Status, Value
 
-FAILURE_SHOWN = 1.0
-"""Time (s) for which a failure is shown."""
-LOAD_WINDOW, LOAD_INTERVAL = 40 * SECOND, SECOND // 50
-"""Window and interval of the estimates of the load at the tip, ns."""
+FAILURE_SHOWN = 1.0  # time (s) for which a failure is shown
+LOAD_WINDOW, SWING_WINDOW = (
+    40 * SECOND,
+    4 * SECOND,
+)  # ns, of loads at the tip; of its displacements, four periods of a slow boom
+INTERVAL = SECOND // 50  # ns between two of them
 MEGA = 1e6
+Item = TypeVar("Item")
 
 
 class ModelWatch:
@@ -120,30 +124,71 @@ class ModelWatch:
         self._looked, self._steps, self._busy, self._longest = now, 0, 0.0, 0.0
 
 
+class StampWindow(Generic[Item]):
+    """Items of the last `window` by their stamps, at most one in every `INTERVAL`."""
+
+    def __init__(self, window: int) -> None:
+        self._window = window
+        self._items: deque[tuple[int, Item]] = deque()
+
+    def is_due(self, stamp: int) -> bool:
+        """Return True if no item was added within the `INTERVAL` before `stamp` (ns)."""
+        return not self._items or not 0 <= stamp - self._items[-1][0] < INTERVAL
+
+    def add(self, stamp: int, item: Item) -> None:
+        """Add an item that `is_due`."""
+        if self._items and stamp < self._items[-1][0]:  # the clock was set back
+            self._items.clear()
+        self._items.append((stamp, item))
+        while stamp - self._items[0][0] > self._window:
+            self._items.popleft()
+
+    @property
+    def items(self) -> list[Item]:
+        """Items in the window."""
+        return [item for _, item in self._items]
+
+
+class SwingWatch:
+    """Displacements of the tip in the last `SWING_WINDOW`: estimated by all sensors, else predicted."""
+
+    def __init__(self) -> None:
+        self._places = StampWindow[Array](SWING_WINDOW)
+
+    def took(self, report: Report) -> None:
+        """Take a report."""
+        p = report.prediction
+        if p is not None and self._places.is_due(report.stamp):
+            e = report.estimate
+            place = p.tip_displacement if e is None else p.tip_displacement + e.tip[:2] - p.tip_position
+            self._places.add(report.stamp, place)
+
+    def status(self, judge: ComponentJudge) -> Status:
+        """Return the status with the swing: the largest distance of the tip from its mean, m."""
+        places, limits = np.array(self._places.items), judge.at.thresholds
+        swing = float(np.linalg.norm(places - places.mean(axis=0), axis=1).max()) if len(places) else nan
+        bounds = Bounds(limits.swing_warn, limits.swing_error)
+        judge.check("swing_m", swing, bounds, "the tip swings too far: slow the pump down or stop the move", at_once=True)
+        return judge.finish("the tip swings less than its limit")
+
+
 class LoadWatch:
     """Estimated disturbance force at the tip in the last `LOAD_WINDOW`. It is never a fault."""
 
     def __init__(self) -> None:
         self.explanation = ""  # reason of residuals above noise; empty without a load at the last look
-        self._loads: deque[Estimate] = deque()
+        self._loads = StampWindow[Estimate](LOAD_WINDOW)
 
-    def is_due(self, stamp: int) -> bool:
-        """Return True if no estimate was taken within the `LOAD_INTERVAL` before `stamp` (ns)."""
-        return not self._loads or not 0 <= stamp - self._loads[-1].stamp < LOAD_INTERVAL
-
-    def took(self, estimate: Estimate) -> None:
-        """Take an estimate that `is_due`."""
-        if self._loads and estimate.stamp < self._loads[-1].stamp:  # the clock was set back
-            self._loads.clear()
-        self._loads.append(estimate)
-        while estimate.stamp - self._loads[0].stamp > LOAD_WINDOW:
-            self._loads.popleft()
+    def took(self, report: Report) -> None:
+        """Take a report."""
+        if self._loads.is_due(report.stamp) and (estimate := report.estimate) is not None:
+            self._loads.add(report.stamp, estimate)
 
     def status(self, judge: ComponentJudge) -> Status | None:
         """Return the status; None if only strokes are measured."""
-        finder = TipLoadFinder()
-        stamps = np.array([each.stamp for each in self._loads], np.int64)
-        loads, variances = (np.array([getattr(each, name) for each in self._loads]) for name in ("load", "load_variance"))
+        finder, kept = TipLoadFinder(), self._loads.items
+        stamps = np.array([each.stamp for each in kept], np.int64)
+        loads, variances = (np.array([getattr(each, name) for each in kept]) for name in ("load", "load_variance"))
         finder.add(stamps, loads.reshape(-1, 2), variances.reshape(-1, 2))
         load, self.explanation = finder.load, ""
         if load is None:

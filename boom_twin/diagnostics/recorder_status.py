@@ -7,24 +7,18 @@ from dataclasses import dataclass
 
 from .levels import Bounds, ComponentJudge, Level, Status
 
-ENDED = "ended"
-"""Key with value 1 in the last status of a recording."""
+ENDED = "ended"  # key with value 1 in the last status of a recording
 
 
 @dataclass(frozen=True, slots=True)
 class DiskState:
     """State of a recording's files and of the disk."""
 
-    lag: float
-    """Age of the oldest message that a power failure would lose, s."""
-    waiting: int
-    """Bytes of messages in memory."""
-    written: int
-    """Bytes of all files."""
-    free: int
-    """Free bytes of the disk."""
-    left: float
-    """Time until the disk is full at this recording's mean rate, s."""
+    lag: float  # age of the oldest message that a power failure would lose, s
+    waiting: int  # bytes of messages in memory
+    written: int  # bytes of all files
+    free: int  # free bytes of the disk
+    left: float  # time until the disk is full at this recording's mean rate, s
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,8 @@ from ..types import SENSORS, Mount, Stream
 from .levels import Bounds, ComponentJudge, Status
 from .stream_stats import ChannelStats
 
-SLOW = 2.0
-"""Largest step of stamps that is no gap at any rate, in sampling periods."""
-RANGE_MARGIN = 5.0
-"""Tolerance of a sensor's range, in standard deviations of its noise."""
+SLOW = 2.0  # largest step of stamps that is no gap at any rate, in sampling periods
+RANGE_MARGIN = 5.0  # tolerance of a sensor's range, in standard deviations of its noise
 
 
 @dataclass(frozen=True, slots=True)

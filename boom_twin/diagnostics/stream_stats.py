@@ -13,30 +13,21 @@ from numpy.typing import NDArray
 
 from ..types import NANO, Array, Sample
 
-LONGEST_PAUSE = 10.0
-"""Longest step of stamps (s) that is a pause of the sensor; a longer one is a jump of its clock."""
+LONGEST_PAUSE = 10.0  # longest step of stamps (s) that is a pause of the sensor; a longer one is a jump of its clock
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelStats:
     """Statistics of one sensor since the last look."""
 
-    value: float
-    """Newest reading, in the sensor's unit; NaN before the first one."""
-    stamp: int
-    """Stamp of `value`, ns; 0 before the first one."""
-    rate: float
-    """Readings a second, by their stamps; NaN if fewer than two."""
-    gap: float
-    """Longest step between their stamps, s."""
-    gaps: int
-    """Steps longer than permitted, since listening began."""
-    missing: float
-    """Share of the messages without a finite value; NaN without messages."""
-    outside: float
-    """Share of the messages with a value out of range; NaN without messages."""
-    unchanged: int
-    """Consecutive readings, up to the newest, that repeat the one before."""
+    value: float  # newest reading, in the sensor's unit; NaN before the first one
+    stamp: int  # stamp of `value`, ns; 0 before the first one
+    rate: float  # readings a second, by their stamps; NaN if fewer than two
+    gap: float  # longest step between their stamps, s
+    gaps: int  # steps longer than permitted, since listening began
+    missing: float  # share of the messages without a finite value; NaN without messages
+    outside: float  # share of the messages with a value out of range; NaN without messages
+    unchanged: int  # consecutive readings, up to the newest, that repeat the one before
 
 
 class Channel:
@@ -92,19 +83,8 @@ class Rows:
 class StreamWatch:
     """Statistics of one stream, computed when `look` is called. Times are in s, stamps in ns.
 
-    Parameters
-    ----------
-    ranges : ndarray, shape (n, 2)
-        Least and greatest reading of each channel, in the sensor's unit.
-    monotonic : callable
-        Monotonic clock, s.
-
     Attributes
     ----------
-    count : int
-        Messages, since the beginning.
-    newest : int or None
-        Stamp of the newest message.
     lag : float
         Least time from stamp to arrival between the last two looks, s; NaN without messages. It contains an unknown clock
         offset. The difference of two streams' lags is the offset between their clocks.
@@ -112,7 +92,7 @@ class StreamWatch:
 
     def __init__(self, ranges: Array, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._ranges, self._monotonic = ranges.tolist(), monotonic
-        self.count = 0
+        self.count = 0  # messages, since the beginning
         self.begin()
 
     def begin(self) -> None:

@@ -22,18 +22,12 @@ FOLLOWED = "The twin follows the one whose stamps increase; ROS does not report 
 class Peers:
     """Publishers of an input, or subscribers of an output."""
 
-    address: str = ""
-    """Resolved name of the topic."""
-    names: Sequence[str] = ()
-    """Names of their nodes."""
-    incompatible: Sequence[str] = ()
-    """Peers whose quality of service prevents a connection, with the reason in words."""
-    ids: Sequence[str] = ()
-    """Their hexadecimal GIDs, in the order of `names`."""
-    rivals: int = 0
-    """Publishers of an output beside the node's own."""
-    mistyped: Sequence[str] = ()
-    """Other endpoints whose message type prevents a connection, with that type in words."""
+    address: str = ""  # resolved name of the topic
+    names: Sequence[str] = ()  # names of their nodes
+    incompatible: Sequence[str] = ()  # peers whose quality of service prevents a connection, with the reason in words
+    ids: Sequence[str] = ()  # their hexadecimal GIDs, in the order of `names`
+    rivals: int = 0  # publishers of an output beside the node's own
+    mistyped: Sequence[str] = ()  # other endpoints whose message type prevents a connection, with that type in words
 
     def warn(self, judge: ComponentJudge, prefix: str = "") -> None:
         """Warn of peers that cannot connect."""
@@ -116,20 +110,13 @@ def publishers_status(judge: ComponentJudge, publishers: Mapping[Stream, Peers],
 class Reception:
     """Reception of one topic; counts since the node was activated."""
 
-    received: int = 0
-    """Messages that arrived."""
-    lost: int = 0
-    """Messages that never arrived, by the publisher's sequence numbers; valid if `is_numbered`."""
-    dropped: int = 0
-    """Messages dropped unread to make room for newer ones."""
-    waiting: int = 0
-    """Messages waiting now."""
-    wait: float = nan
-    """Longest time (s) from arrival to being read since the last look; NaN without any."""
-    latency: float = nan
-    """Longest time (s) from arrival to the report since the last look; NaN without any."""
-    is_numbered: bool = True
-    """True if the sequence numbers since the last look are those of one publisher."""
+    received: int = 0  # messages that arrived
+    lost: int = 0  # messages that never arrived, by the publisher's sequence numbers; valid if `is_numbered`
+    dropped: int = 0  # messages dropped unread to make room for newer ones
+    waiting: int = 0  # messages waiting now
+    wait: float = nan  # longest time (s) from arrival to being read since the last look; NaN without any
+    latency: float = nan  # longest time (s) from arrival to the report since the last look; NaN without any
+    is_numbered: bool = True  # True if the sequence numbers since the last look are those of one publisher
 
 
 class ReceptionWatch:

@@ -11,10 +11,9 @@ from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Thresholds
 from ..types import SENSORS, Health, Report, Sample, Stream
 from .levels import ComponentJudge, Evaluation, Level, Status, Value
-from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, stress_status
+from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, SwingWatch, stress_status
 from .sensor_status import SensorSpec, sensor_status
 from .stream_stats import Rows, StreamWatch
-from .swing_status import SwingWatch
 from .topic_status import Peers, Reception, ReceptionWatch, outputs_status, publishers_status, seconds, topic_status
 
 
@@ -36,12 +35,6 @@ class TwinWatch:
         Sensors in the order of a sample's values. The first stream drives the model. Empty before the node is configured.
     names : dict of Stream to str
         Names of the input topics. Streams in the messages of another one have none.
-    thresholds : Thresholds
-        Replaceable at run time.
-    monotonic : callable
-        Monotonic clock, s.
-    stress : BendingStressModel, optional
-        Model of the stress, if sections bend.
     """
 
     def __init__(
@@ -89,9 +82,8 @@ class TwinWatch:
                 rows.append(residuals.normalised)
             if each.prediction is not None:
                 self._newest = each
-                self._swing.took(each)
-            if self._load.is_due(each.stamp) and each.estimate is not None:
-                self._load.took(each.estimate)
+            self._swing.took(each)
+            self._load.took(each)
             self.judged(each.health, 0.0)
 
     def judged(self, health: Health | None, duration: float) -> None:
@@ -151,8 +143,6 @@ class TwinWatch:
             Reason why the twin does not listen, or empty.
         publishers, subscribers : dict of Stream to Peers, iterable of Peers
             Peers of every input, and of all outputs.
-        clock : float
-            Time of the stamps' clock, s.
         reception : dict of str to Reception, optional
             Reception by name of the topic; None if nothing is received live.
         wrong_names : dict of Stream to tuple of Level and str, optional

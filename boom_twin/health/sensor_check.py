@@ -14,7 +14,7 @@ from ..scene.schema import Scene
 from ..types import GIVE, Array, Mount, Stream, channels_of
 from .sensor_findings import NOISY as IS_NOISY
 from .sensor_findings import OUTSIDE, SILENT, SPIKE, SPIKES, STUCK, find
-from .sensor_survey import FIRST, LASTING, ROOM, CheckWork, survey
+from .sensor_survey import LATELY, ROOM, CheckLimits, CheckWork, survey
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -128,16 +128,16 @@ class SensorCheck:
     def __init__(self, sigma: float, resolution: float, low: Array, high: Array, fastest: float) -> None:
         self._sigma = math.sqrt(sigma**2 + resolution**2 / 12.0)
         self._fastest = fastest
-        self._patience = repeats(sigma, resolution)
         count, rows = len(low), 3 + ROOM
         margin, stated2 = 5.0 * self._sigma, self._sigma**2
-        limits = [
-            SILENT_FOR, (4.0 * NOISY) ** 2 * stated2, stated2, NOISY_WINDOW, USUAL_WINDOW,
-            SPIKE * self._sigma, NOISY**2, NOISY**2 * stated2, MISSING, self._patience,
-        ]  # fmt: skip
+        limits = CheckLimits(
+            gap=SILENT_FOR, cut=(4.0 * NOISY) ** 2 * stated2, stated=stated2, window=NOISY_WINDOW, long_window=USUAL_WINDOW,
+            leap=SPIKE * self._sigma, loud=NOISY**2, loudest_usual=NOISY**2 * stated2, lack=MISSING,
+            patience=repeats(sigma, resolution),
+        )  # fmt: skip
         self._known = CheckWork(
-            limits=np.array(limits, float),
-            lately=np.array([math.inf, 0.0, stated2, stated2]),
+            limits=limits,
+            lately=np.array([(math.inf, 0, stated2, stated2)], LATELY),
             times=np.zeros(rows),
             raw=np.full((rows, count), np.nan),
             left=np.full((rows, count), np.nan),
@@ -158,7 +158,7 @@ class SensorCheck:
     @property
     def noise(self) -> float:
         """Present noise of most channels, in multiples of the stated noise."""
-        return math.sqrt(self._known.lately[LASTING]) / self._sigma
+        return math.sqrt(self._known.lately["lasting"][0]) / self._sigma
 
     def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
         """Take the readings of a block.
@@ -174,7 +174,7 @@ class SensorCheck:
         """
         rows = len(stamps)
         if not rows:
-            return self._calm if self._known.lately[FIRST] == math.inf else self._nothing(raw.shape[1], now)
+            return self._calm if self._known.lately["first"][0] == math.inf else self._nothing(raw.shape[1], now)
         self._make_room(3 + rows)
         is_calm, largest = self._survey(self._held, stamps, np.ascontiguousarray(raw), np.ascontiguousarray(expected), now)
         return self._calm if is_calm else self._findings(largest, rows, now)
@@ -192,7 +192,7 @@ class SensorCheck:
         known = self._known
         interval = (known.times[2 + rows] - known.times[2]) / rows
         is_motion = self._fastest > 0.0 and JERK * interval**3 > NOISY * self._sigma  # what bends readings so much
-        is_known = bool(now - known.lately[FIRST] > NOISY_WINDOW and not is_motion)  # how noisy the sensors are
+        is_known = bool(now - known.lately["first"][0] > NOISY_WINDOW and not is_motion)  # how noisy the sensors are
         flags, jumped = np.empty((5, len(known.power)), dtype=bool), np.empty(len(known.power))
         if not self._find(self._held, largest, now, is_known, self._fastest, self._column, flags, jumped):
             return self._calm

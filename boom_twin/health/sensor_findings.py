@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .sensor_survey import GAP, LACK, LEAP, PATIENCE, ROWS, STATED, loud, noise2_at
+from .sensor_survey import loud, noise2_at
 
 STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
 SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its neighbours
@@ -37,17 +37,17 @@ def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
     jumped : ndarray, shape (channels,)
         Written: how far readings changed from one to the next, for good, while the model did not; 0 where they did not.
     """
-    limits, power, count = sensors.limits, sensors.power, 3 + int(sensors.lately[ROWS])
+    limits, power, count = sensors.limits, sensors.power, 3 + sensors.lately[0].rows
     live, newest, found = is_any_live(sensors), sensors.times[count - 1], False
     for i in range(power.shape[0]):
         is_spiky, jumped[i] = False, 0.0
-        if largest > limits[LEAP]:
+        if largest > limits.leap:
             noise = noise_of(sensors, count, i, column)
             is_spiky, jumped[i] = has_spikes(sensors, count, i, SPIKE * noise), jump(sensors, count, i, JUMP * noise, fastest)
-        flags[STUCK, i] = live and sensors.run[i] >= limits[PATIENCE] and newest - sensors.since[i] >= REPEATS_FOR
+        flags[STUCK, i] = live and sensors.run[i] >= limits.patience and newest - sensors.since[i] >= REPEATS_FOR
         flags[NOISY, i] = is_known and power[i] > loud(sensors)
         flags[SPIKES, i] = is_known and is_spiky
-        flags[SILENT, i] = now - sensors.heard[i] > limits[GAP] or sensors.missing[i] > limits[LACK]
+        flags[SILENT, i] = now - sensors.heard[i] > limits.gap or sensors.missing[i] > limits.lack
         flags[OUTSIDE, i] = sensors.outside[i] > 0.5 * (count - 3)
         found = found or jumped[i] != 0.0
         for kind in range(5):
@@ -58,7 +58,7 @@ def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
 @inner
 def is_any_live(sensors):
     """Return True if a channel of several is alive with noise."""
-    power, least = sensors.power, QUIET * math.sqrt(sensors.limits[STATED])
+    power, least = sensors.power, QUIET * math.sqrt(sensors.limits.stated)
     live = False
     for i in range(power.shape[0] if power.shape[0] > 1 else 0):
         live = live or power[i] > least * least
@@ -72,7 +72,7 @@ def noise_of(sensors, count, i, column):
     That median does not wait for the noise to be measured, as a mean over time does, and one spike leaves it as it is. A sensor
     that has twice the stated noise gives no spikes by that.
     """
-    variance, size = sensors.limits[STATED], 0
+    variance, size = sensors.limits.stated, 0
     if sensors.power[i] > variance:
         variance = sensors.power[i]
     for t in range(3, count):
@@ -98,7 +98,7 @@ def sorted_in(column, size, value):
 @inner
 def step(sensors, t, i):
     """Return the change of the residual to reading t of channel i from the one before; NaN across a gap."""
-    if sensors.times[t] - sensors.times[t - 1] > sensors.limits[GAP]:
+    if sensors.times[t] - sensors.times[t - 1] > sensors.limits.gap:
         return math.nan
     return sensors.left[t, i] - sensors.left[t - 1, i]
 

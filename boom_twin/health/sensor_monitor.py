@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..types import Alarm, Array, SensorKind
+from ..sensor_kinds import SensorKind
+from ..types import Alarm, Array
 from .sensor_check import MISSTATED, NOISE_OVER, Flags, SensorFindings
 
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended

@@ -14,37 +14,73 @@ from ..types import NANO, Array
 Integers = NDArray[np.int64]
 
 ROOM = 32  # readings of a block for which callers allocate memory at first
-COUNTS, OFF, RATES = range(3)  # rows of `ReadingsWork.numbers`
-SLOW_READ, SLOW_EXPECTED, SLOW_SQUARES, SLOW_VARIANCE, SLOW_RATE, WEIGHT = range(6)  # of `ReadingsWork.slow`
-VARIANCE, BENT, WHITE = range(3)  # of `ReadingsWork.limits`
-GAP, CUT, STATED, WINDOW, LONG_WINDOW, LEAP, LOUD, LOUDEST_USUAL, LACK, PATIENCE = range(10)  # of `CheckWork.limits`
-FIRST, ROWS, NOISE, LASTING = range(4)  # of `CheckWork.lately`
+SHAKEN = 3.0  # multiple of the stated variance above which second differences show motion
+WHITE = 0.75  # ratio of third to second differences below which they show motion, not noise
+
+
+@by_reference
+class SlowMeans(NamedTuple):
+    """Means over some time, updated in place; shape (channels,) each.
+
+    read, expected, variance, rate : weighted sums of readings, of what the model expected, of the expected variance of their
+    difference, and of the expected reading's rate (1/s). Divided by `weight` they are means.
+    weight : from 0 to 1.
+    """
+
+    read: Array
+    expected: Array
+    variance: Array
+    rate: Array
+    weight: Array
 
 
 @by_reference
 class ReadingsWork(NamedTuple):
     """State of `summarise` for one stream.
 
-    limits : (3,) VARIANCE, stated variance of the noise. BENT, multiple of it above which second differences show motion.
-    WHITE, ratio of third to second differences (`rough2`, `bend2`) below which they show motion.
-    numbers : (3, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
-    slow : (6, channels) see `boom_twin.health.stream_readings.SlowMeans`.
+    stated : variance of the noise.
+    counts, off, rates : (channels,) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
+    slow : SlowMeans.
     """
 
-    limits: Array
-    numbers: Array
-    slow: Array
+    stated: float
+    counts: Array
+    off: Array
+    rates: Array
+    slow: SlowMeans
+
+
+@by_reference
+class CheckLimits(NamedTuple):
+    """Limits of `survey` and `find`.
+
+    gap : time (s) between readings above which they are not compared. cut : largest variance that one outlier adds. stated :
+    variance of the noise. window, long_window : averaging times (s) of a channel's noise and of the usual noise. A block with
+    less than these has no finding: leap, change between two readings; loud, multiple of the usual variance, bounded by
+    loudest_usual; lack, share of missing readings; patience, repetitions of a reading.
+    """
+
+    gap: float
+    cut: float
+    stated: float
+    window: float
+    long_window: float
+    leap: float
+    loud: float
+    loudest_usual: float
+    lack: float
+    patience: int
+
+
+LATELY = np.dtype([("first", float), ("rows", np.int64), ("noise", float), ("lasting", float)])
+"""Time (s) of the first reading; readings in the newest block; usual variance of the noise, now and averaged."""
 
 
 @by_reference
 class CheckWork(NamedTuple):
     """State of `survey` for one stream.
 
-    limits : (10,) GAP, time (s) between readings above which they are not compared. CUT, largest variance that one outlier
-    adds. STATED, stated variance of the noise. WINDOW, LONG_WINDOW, averaging times (s) of a channel's noise and of the usual
-    noise. A block with less than these has no finding: LEAP, change between two readings. LOUD, multiple of the usual
-    variance, bounded by LOUDEST_USUAL. LACK, share of missing readings. PATIENCE, repetitions of a reading.
-    lately : (4,) time (s) of the first reading; readings in the newest block; usual variance of the noise, now and averaged.
+    lately : (1,) see `LATELY`.
     times, raw, left : (3 + k,), (3 + k, channels), (3 + k, channels) stamps (s), readings, residuals. The newest three before
     the block are first.
     low, high : (channels,) the range of the sensors.
@@ -53,8 +89,8 @@ class CheckWork(NamedTuple):
     missing, outside : (channels,) share of missing readings; number of readings of the newest block out of range.
     """
 
-    limits: Array
-    lately: Array
+    limits: CheckLimits
+    lately: NDArray[np.void]
     times: Array
     raw: Array
     left: Array
@@ -121,29 +157,29 @@ def survey(sensors, stamps, raw, expected, now):
     largest : float
         Largest change of `left` between two readings, except across a gap.
     """
-    limits, lately, rows = sensors.limits, sensors.lately, stamps.shape[0]
+    limits, lately, rows = sensors.limits, sensors.lately[0], stamps.shape[0]
     keep_newest(sensors)
-    lately[ROWS] = rows
-    if not lately[FIRST] <= stamps[0]:
-        lately[FIRST] = stamps[0]
+    lately.rows = rows
+    if not lately.first <= stamps[0]:
+        lately.first = stamps[0]
     span = max(stamps[rows - 1] - stamps[0], 1e-3)
-    largest, loudest, longest, lack, most, is_whole = go_on(sensors, stamps, raw, expected, min(1.0, span / limits[WINDOW]))
-    lately[NOISE] = usual_power(sensors.power, limits[STATED])
-    lately[LASTING] += min(1.0, span / limits[LONG_WINDOW]) * (lately[NOISE] - lately[LASTING])
-    is_live = is_whole and now - stamps[rows - 1] <= limits[GAP] and lack <= limits[LACK] and longest < limits[PATIENCE]
-    return is_live and most <= 0.5 * rows and largest <= limits[LEAP] and loudest <= loud(sensors), largest
+    largest, loudest, longest, lack, most, is_whole = go_on(sensors, stamps, raw, expected, min(1.0, span / limits.window))
+    lately.noise = usual_power(sensors.power, limits.stated)
+    lately.lasting += min(1.0, span / limits.long_window) * (lately.noise - lately.lasting)
+    is_live = is_whole and now - stamps[rows - 1] <= limits.gap and lack <= limits.lack and longest < limits.patience
+    return is_live and most <= 0.5 * rows and largest <= limits.leap and loudest <= loud(sensors), largest
 
 
 @inner
 def loud(sensors):
     """Return the variance of the noise above which a channel is noisy."""
-    return sensors.limits[LOUD] * min(sensors.lately[NOISE], sensors.limits[LOUDEST_USUAL])
+    return sensors.limits.loud * min(sensors.lately[0].noise, sensors.limits.loudest_usual)
 
 
 @inner
 def keep_newest(sensors):
     """Move the newest three readings to the front."""
-    rows = int(sensors.lately[ROWS])
+    rows = sensors.lately[0].rows
     for t in range(3):
         sensors.times[t] = sensors.times[rows + t]
         for i in range(sensors.raw.shape[1]):
@@ -180,7 +216,7 @@ def go_on(sensors, stamps, raw, expected, share):
     reading is missing.
     """
     times, all_raw, left, count = sensors.times, sensors.raw, sensors.left, 3 + stamps.shape[0]
-    gap, cut, variance = sensors.limits[GAP], sensors.limits[CUT], sensors.limits[STATED]
+    gap, cut, variance = sensors.limits.gap, sensors.limits.cut, sensors.limits.stated
     power, run, missing, outside = sensors.power, sensors.run, sensors.missing, sensors.outside
     for t in range(3, count):
         times[t] = stamps[t - 3]
@@ -243,30 +279,29 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
     share : float
         Weight of the block in the slow means.
     """
-    numbers, slow, last = work.numbers, work.slow, stamps.shape[0] - 1
+    counts, means, rates, slow, last = work.counts, work.off, work.rates, work.slow, stamps.shape[0] - 1
     span = (stamps[last] - stamps[0]) * NANO
     for i in range(raw.shape[1]):
-        known, read, off, squares, variance = 0, 0.0, 0.0, 0.0, 0.0
+        known, read, off, variance = 0, 0.0, 0.0, 0.0
         for t in range(last + 1):
             if math.isfinite(left[t, i]):
                 known += 1
                 read += raw[t, i]
                 off += left[t, i]
-                squares += left[t, i] * left[t, i]
                 variance += sigmas[t, i] * sigmas[t, i]
-        numbers[COUNTS, i], numbers[OFF, i], numbers[RATES, i] = known, off / max(known, 1), math.nan
+        counts[i], means[i], rates[i] = known, off / max(known, 1), math.nan
         if span > 0.0:
-            numbers[RATES, i] = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span
+            rates[i] = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span
         if masked[i]:
-            slow[:, i] = 0.0
+            for each in (slow.read, slow.expected, slow.variance, slow.rate, slow.weight):
+                each[i] = 0.0
         elif known > 0:
-            slow[SLOW_READ, i] += share * (read / known - slow[SLOW_READ, i])
-            slow[SLOW_EXPECTED, i] += share * ((read - off) / known - slow[SLOW_EXPECTED, i])
-            slow[SLOW_SQUARES, i] += share * (squares / known - slow[SLOW_SQUARES, i])
-            slow[SLOW_VARIANCE, i] += share * (variance / known - slow[SLOW_VARIANCE, i])
-            slow[WEIGHT, i] += share * (1.0 - slow[WEIGHT, i])
-        if math.isfinite(numbers[RATES, i]) and not masked[i]:
-            slow[SLOW_RATE, i] += share * (numbers[RATES, i] - slow[SLOW_RATE, i])
+            slow.read[i] += share * (read / known - slow.read[i])
+            slow.expected[i] += share * ((read - off) / known - slow.expected[i])
+            slow.variance[i] += share * (variance / known - slow.variance[i])
+            slow.weight[i] += share * (1.0 - slow.weight[i])
+        if math.isfinite(rates[i]) and not masked[i]:
+            slow.rate[i] += share * (rates[i] - slow.rate[i])
     return is_bent(work, raw, masked)
 
 
@@ -283,7 +318,7 @@ def is_bent(work, raw, masked):
             power += bend2(raw, t, i)
         for t in range(3, count):
             rougher += rough2(raw, t, i)
-        is_quick = power > work.limits[BENT] * work.limits[VARIANCE] * (count - 2)
-        if is_quick and rougher < work.limits[WHITE] * power and not masked[i]:
+        is_quick = power > SHAKEN * work.stated * (count - 2)
+        if is_quick and rougher < WHITE * power and not masked[i]:
             found = True
     return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,45 +10,10 @@ from numpy.typing import NDArray
 from ..kernels.jit import SameTypes, hold
 from ..types import Array
 from .blocks import MeasuredRows
-from .sensor_survey import (
-    COUNTS,
-    OFF,
-    RATES,
-    SLOW_EXPECTED,
-    SLOW_RATE,
-    SLOW_READ,
-    SLOW_SQUARES,
-    SLOW_VARIANCE,
-    WEIGHT,
-    ReadingsWork,
-    summarise,
-)
+from .sensor_survey import ReadingsWork, SlowMeans, summarise
 
-SHAKEN = 3.0  # variances of a reading in its second differences, from which on the boom is shaken
-WHITE = 0.75  # share of that variance that third differences have at least if it is noise
 WINDOW = 2.0  # s, time constant of the slow means
 ENOUGH = 0.6  # weight of slow means that are judged: after 1.8 s
-
-
-@dataclass(frozen=True, slots=True)
-class SlowMeans:
-    """Means over the last `WINDOW`, kept up to date in place; shape (channels,) each.
-
-    Attributes
-    ----------
-    read, expected, squares, variance, rate : ndarray
-        Weighted sums that begin at 0. Divided by `weight` they are means: of what was read, of what the model had, of the
-        squared difference, of its expected variance, and of the expected reading's rate (1/s).
-    weight : ndarray
-        From 0 to 1.
-    """
-
-    read: Array
-    expected: Array
-    squares: Array
-    variance: Array
-    rate: Array
-    weight: Array
 
 
 class StreamReadings(NamedTuple):
@@ -93,10 +57,9 @@ class StreamSurvey:
     """
 
     def __init__(self, variance: float, channels: int) -> None:
-        self._numbers, slow = np.zeros((3, channels)), np.zeros((6, channels))
-        self._held = hold(ReadingsWork(np.array([variance, SHAKEN, WHITE]), self._numbers, slow))
-        rows = SLOW_READ, SLOW_EXPECTED, SLOW_SQUARES, SLOW_VARIANCE, SLOW_RATE, WEIGHT
-        self.slow = SlowMeans(*(slow[row] for row in rows))
+        self.slow, numbers = SlowMeans(*np.zeros((5, channels))), np.zeros((3, channels))
+        self._work = ReadingsWork(variance, numbers[0], numbers[1], numbers[2], self.slow)
+        self._held = hold(self._work)
         none, unknown = np.zeros(channels), np.full(channels, np.nan)
         self._nothing = StreamReadings(MeasuredRows.room(0, channels), none, none, unknown, self.slow, False)
         self._summarise = SameTypes(summarise)
@@ -117,5 +80,5 @@ class StreamSurvey:
             return self._nothing
         columns = map(np.ascontiguousarray, rows)
         is_bent = self._summarise(self._held, *columns, masked, min(1.0, span / WINDOW))
-        numbers = self._numbers.copy()
-        return StreamReadings(rows, numbers[COUNTS], numbers[OFF], numbers[RATES], self.slow, bool(is_bent))
+        work = self._work
+        return StreamReadings(rows, work.counts.copy(), work.off.copy(), work.rates.copy(), self.slow, bool(is_bent))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..scene.schema import Scene
 from ..types import SENSORS, Alarm, Array, Mount, Place, Ranked, Stream, StrokeReading, channels_of, streams_of
 from ..wiring.check import Checked, check
+from ..wiring.expected import RestModel
 from ..wiring.readings import Channel, Series, Window, is_checked
 from ..wiring.words import channel_name, likely
 from .blocks import Block
@@ -64,6 +65,7 @@ class WiringMonitor:
         """Restart with the boom at rest; alarms last until the next check."""
         self._blocks: list[tuple[int, Mapping[Stream, Array]]] = []
         self._age, self._searched = 0, False
+        self._model: RestModel | None = None
         self._search: tuple[int, Future[Checked | None]] | None = None
         self._wrong = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
         self._doubted = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
@@ -130,8 +132,9 @@ class WiringMonitor:
 
         After the first search, only its successors say that further channels are wrong.
         """
-        window = self._window()
-        found = check(self._scene, self._reads, self._declared, window, is_quick=True, places=self._places)
+        window, boom = self._window(), (self._scene, self._reads, self._places)
+        self._model = self._model or RestModel(*boom)
+        found = check(self._model, self._declared, window, is_quick=True)
         if found is None:
             return
         is_sound = not any(verdict.is_wrong for verdict in found.verdicts)
@@ -142,8 +145,7 @@ class WiringMonitor:
             self._right[verdict.stream][place] |= not verdict.is_wrong
         if self._search is None and not is_sound:
             self._worker = self._worker or ThreadPoolExecutor(1, "wiring")
-            search = self._worker.submit(check, self._scene, self._reads, self._declared, window, places=self._places)
-            self._search = self._age + DELAY, search
+            self._search = self._age + DELAY, self._worker.submit(check, RestModel(*boom), self._declared, window)
 
     def _window(self) -> Window:
         """Return the means of all blocks since the start by stream and channel."""

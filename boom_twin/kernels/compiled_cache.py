@@ -31,7 +31,7 @@ KERNEL_SOURCES = (
     "kernels", "analysis/cylinder_drives.py", "analysis/equilibrium.py", "deviation", "twin/update.py",
     "twin/state.py", "twin/regular.py", "twin/blocks.py",
     "calibration/rest_filter.py",
-    "health/sensor_survey.py", "health/sensor_findings.py", "types.py",
+    "health/sensor_survey.py", "health/sensor_findings.py", "types.py", "sensor_kinds.py",
 )  # fmt: skip
 """Folders and modules of the package that kernels, or the constants in them, come from."""
 SUFFIX, USER = ".kernel", ".user"
@@ -142,22 +142,11 @@ def _is_own_group(number: int) -> bool:
 class KernelCache:
     """The compiled code of one kernel on disk; has what numba's dispatcher asks of a cache.
 
-    It loads without first filling numba's tables of types and of BLAS: that takes 0.25 s, most of it an import of
-    scipy.linalg, and only compiling needs them, which fills them itself. Likewise the intermediate code beside the machine code
-    is read only where a function that is no kernel copies this one: reading it is four fifths of a load. The kernels that this
-    one calls are loaded before it.
+    It loads without first filling numba's tables of types and of BLAS, which takes 0.25 s: only compiling needs them, which
+    fills them itself. The intermediate code beside the machine code is read only where a function that is no kernel copies
+    this one: reading it is four fifths of a load. Kernels that this one calls are loaded before it.
 
-    Parameters
-    ----------
-    function : callable
-        The kernel in Python.
-    folder : Path
-        From `cache_folder`, without a `fault_of`.
-
-    Raises
-    ------
-    ImportError, AttributeError
-        numba does not have its parts where they were in the versions that are tested.
+    ImportError or AttributeError if numba does not have its parts where they were in the versions that are tested.
     """
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:

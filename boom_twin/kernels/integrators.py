@@ -38,20 +38,14 @@ DEPTH, LONG_DEPTH = 4, 8
 
 
 class Scheme(NamedTuple):
-    """One scheme at one step size.
-
-    family, parameter : arguments of `prepare`.
-    reach : time from the newest history to the instant that is solved for, s.
-    gain, rate : A (1/s^2) and C (1/s).
-    weights : (2 + depth, 3 + depth), see the module's constants.
-    """
+    """One scheme at one step size; `family` and `parameter` are arguments of `prepare`."""
 
     family: np.int64
     parameter: float
-    reach: float
-    gain: float
-    rate: float
-    weights: Array
+    reach: float  # time from the newest history to the instant that is solved for, s
+    gain: float  # A, 1/s^2
+    rate: float  # C, 1/s
+    weights: Array  # (2 + depth, 3 + depth), see the module's constants
 
 
 def depth_of(family: int) -> int:

@@ -102,13 +102,7 @@ def _kind(value: Any) -> Any:
 
 
 class HeldFields(int):
-    """Address of the fields of a named tuple that kernels take by reference, see `hold`; with all that stands there.
-
-    Attributes
-    ----------
-    fields : tuple
-        The named tuple.
-    """
+    """Address of the fields of a named tuple that kernels take by reference, see `hold`; with all that stands there."""
 
     fields: Any
     _room: Any
@@ -161,7 +155,6 @@ class Kernel:
 
     @property
     def _numba_type_(self) -> Any:
-        """Type that numba gives this object in a kernel."""
         return self.dispatcher._numba_type_
 
     def __call__(self, *arguments: Any) -> Any:

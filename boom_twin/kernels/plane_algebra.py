@@ -77,19 +77,9 @@ SMALLEST_PIVOT = 1e-300
 def condense(s, p, coupling, block, force, m, n):
     """Eliminate n unknowns z from a symmetric system by L D L^T without pivoting.
 
-    Parameters
-    ----------
-    s, p : ndarray, shapes (>= m, >= m), (>= m,)
-        What remains: H_ee, g_e; condensed in place.
-    coupling, block, force : ndarray, shapes (>= n, >= m), (>= n, >= n), (>= n,)
-        H_ze, H_zz (lower triangle), g_z; coupling and force hold the gains H_zz^-1 H_ze, H_zz^-1 g_z afterwards, block the
-        factors L and 1/D.
-    m, n : int
-
-    Returns
-    -------
-    int
-        Number of negative pivots; -1 if a pivot vanished.
+    What remains, `s` (>= m, >= m) and `p` (>= m,), is H_ee and g_e; condensed in place. `coupling` (>= n, >= m), `block` (>=
+    n, >= n) and `force` (>= n,) are H_ze, H_zz (lower triangle) and g_z. Afterwards coupling and force hold the gains H_zz^-1
+    H_ze and H_zz^-1 g_z, block the factors L and 1/D. Return the number of negative pivots; -1 if a pivot vanished.
     """
     negative = 0
     for k in range(n - 1, -1, -1):

@@ -19,25 +19,13 @@ PIN = 4  # x and y of the journal's offset, force, contact
 
 
 class Results(NamedTuple):
-    """One instant of a boom with n joints and k pins with clearance, or several with a leading axis.
+    """One instant of a boom with n joints and k pins with clearance, or several with a leading axis."""
 
-    Attributes
-    ----------
-    joints, cylinder_forces : ndarray, shape (.., n)
-        rad, N.
-    tip : ndarray, shape (.., 3, 3)
-        Position, velocity, acceleration; of x, y (m) and orientation (rad).
-    pins : ndarray, shape (.., k, 4)
-        Offset x, y of the journal in its bush (m), contact force (N), 1 where they touch.
-    lengths : ndarray, shape (.., n)
-        Of the cylinders, pin to pin less `closed_length`, m.
-    """
-
-    joints: Array
-    cylinder_forces: Array
-    tip: Array
-    pins: Array
-    lengths: Array
+    joints: Array  # (.., n), rad
+    cylinder_forces: Array  # (.., n), N
+    tip: Array  # (.., 3, 3), position, velocity, acceleration; of x, y (m) and orientation (rad)
+    pins: Array  # (.., k, 4), offset x, y of the journal in its bush (m), contact force (N), 1 where they touch
+    lengths: Array  # (.., n), of the cylinders, pin to pin less `closed_length`, m
 
     def at(self, rows: NDArray[np.int64]) -> Results:
         """Some of the instants, by their numbers."""

@@ -114,62 +114,41 @@ class Tables(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Coefficients of accelerations a = gain (x - hat) and velocities v = rate x + offset.
-
-    renew : True if a sweep computes new tangents; False to keep those of `Condensed`.
-    """
+    """Coefficients of accelerations a = gain (x - hat) and velocities v = rate x + offset."""
 
     gain: float
     rate: float
     hat: Array
     offset: Array
-    renew: bool = True
+    renew: bool = True  # True if a sweep computes new tangents; False to keep those of `Condensed`
 
 
 @by_reference
 class State(NamedTuple):
-    """State of the boom between steps.
+    """State of the boom between steps."""
 
-    z : (unknowns,) coordinates and forces, see the tables.
-    history : (depth, histories) of unknowns, then mass points; rows: see `kernels.integrators`.
-    frames : (operations + 1, 5) x, y, theta, cos, sin before every operation, and at the tip.
-    turns : (joints, 8) cosine and sine of a joint's head, and of a six-bar's section, link L, link R.
-    pins : (cylinders, 4) ends C and R of every cylinder, m.
-    contacts : (clearances, 8) memory of pins with clearance, see `kernels.elements.pin_contact`.
-    drives : (2, cylinders) length (m) and rate (m/s) of the drives at the newest history.
-    pace : (1,) length of the last sub-step in ticks, see `kernels.transfer.time_step`.
-    """
-
-    z: Array
-    history: Array
-    frames: Array
-    turns: Array
-    pins: Array
-    contacts: Array
-    drives: Array
-    pace: np.ndarray
+    z: Array  # (unknowns,), coordinates and forces, see the tables
+    history: Array  # (depth, histories), of unknowns, then mass points; rows: see `kernels.integrators`
+    frames: Array  # (operations + 1, 5), x, y, theta, cos, sin before every operation, and at the tip
+    turns: Array  # (joints, 8), cosine and sine of a joint's head, and of a six-bar's section, link L, link R
+    pins: Array  # (cylinders, 4), ends C and R of every cylinder, m
+    contacts: Array  # (clearances, 8), memory of pins with clearance, see `kernels.elements.pin_contact`
+    drives: Array  # (2, cylinders), length (m) and rate (m/s) of the drives at the newest history
+    pace: np.ndarray  # (1,), length of the last sub-step in ticks, see `kernels.transfer.time_step`
 
 
 @by_reference
 class Condensed(NamedTuple):
-    """Result of an inward sweep (`kernels.transfer.riccati_sweep.sweep_in`), used by later sweeps.
+    """Result of an inward sweep (`kernels.transfer.riccati_sweep.sweep_in`), used by later sweeps."""
 
-    gains : (operations, rows, SLOTS) decrements of condensed unknowns per increment of the cut.
-    free : (operations, rows) decrements independent of the cut.
-    factors : (operations, rows, rows) factors of the condensed matrix: L D L^T for a beam, L U for a joint.
-    order : (operations, rows) row order of the factors, see `kernels.plane_algebra`.
-    blocks : (joints, inner, inner) condensed matrix H_qq of a joint; inner: largest number of unknowns of a joint.
-    ends : (clearances, 2, 2), end_gains : (clearances, 2, 5), end_free : (clearances, 2) the same of a cylinder's end.
-    """
-
-    gains: Array
-    free: Array
-    factors: Array
-    order: np.ndarray
-    blocks: Array
-    ends: Array
-    end_gains: Array
-    end_free: Array
+    gains: Array  # (operations, rows, SLOTS), decrements of condensed unknowns per increment of the cut
+    free: Array  # (operations, rows), decrements independent of the cut
+    factors: Array  # (operations, rows, rows), of the condensed matrix: L D L^T for a beam, L U for a joint
+    order: np.ndarray  # (operations, rows), row order of the factors, see `kernels.plane_algebra`
+    blocks: Array  # (joints, inner, inner), matrix H_qq of a joint; inner: largest number of unknowns of a joint
+    ends: Array  # (clearances, 2, 2), the same of a cylinder's end
+    end_gains: Array  # (clearances, 2, 5)
+    end_free: Array  # (clearances, 2)
 
 
 @by_reference

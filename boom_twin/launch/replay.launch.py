@@ -49,12 +49,9 @@ ARGUMENTS = [
     DeclareLaunchArgument("rviz", default_value="true", choices=FLAG, description="start RViz"),
     DeclareLaunchArgument("record", default_value="", description="new folder to record the session into; empty: none"),
 ]
-PLAYER = ("rate", "start", "wait")
-"""Arguments of the player alone; all but these and ``bag`` are passed to ``twin.launch.py``."""
-LAST = 3.0
-"""Time after the end of the session for node and recorder to take the last messages, s."""
-KEPT = {"scene": "scene:=FILE", "mapping": "mapping:=FILE"}
-"""Files that the session keeps, and the argument that replaces each."""
+PLAYER = ("rate", "start", "wait")  # arguments of the player alone; all but these and ``bag`` are passed to ``twin.launch.py``
+LAST = 3.0  # time after the end of the session for node and recorder to take the last messages, s
+KEPT = {"scene": "scene:=FILE", "mapping": "mapping:=FILE"}  # files that the session keeps, and the argument that replaces each
 
 
 def generate_launch_description() -> LaunchDescription:

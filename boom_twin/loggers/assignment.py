@@ -82,7 +82,6 @@ def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) ->
 
     Parameters
     ----------
-    tables : sequence of LogTable
     given : ColumnFile
         Columns that the user gives. The others are recognised by name.
     joints : int or None

@@ -33,10 +33,8 @@ class LoggerLayout(CsvLayout):
 
     units: list[str]
     """Units from the row of units, or empty strings. Known units have this package's spelling."""
-    is_comma: bool
-    """True if the decimal mark is a comma."""
-    samples: list[list[str]]
-    """First rows of data."""
+    is_comma: bool  # True if the decimal mark is a comma
+    samples: list[list[str]]  # first rows of data
     header_line: int
 
     @property

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BagError, UsageError
+from ..errors import BagError, BoomTwinError, UsageError
 from ..system.received_files import open_received
 from .log_table import ArrayTable, CsvLogTable, LogTable, table_of_frame
 
@@ -32,20 +32,26 @@ def tables_of(path: Path) -> list[LogTable]:
     except OSError as error:
         raise BagError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from None
     reader = _READERS.get(path.suffix.lower())
-    return [CsvLogTable(path)] if reader is None else reader(path)
+    if reader is None:
+        return [CsvLogTable(path)]
+    try:
+        return reader(path)
+    except BoomTwinError:
+        raise
+    except Exception as error:  # libraries raise types of their own, also for one damaged group
+        raise BagError(f"{path}: cannot be read ({type(error).__name__}: {error}). Export it as CSV.") from None
 
 
 def _parquet(path: Path) -> list[LogTable]:
-    table = _read(path, "pyarrow.parquet", lambda library: library.read_table(path))
+    table = _library(path, "pyarrow.parquet").read_table(path)
     columns = {name: column.to_numpy() for name, column in zip(table.column_names, table.columns, strict=True)}
     return [table_of_frame(columns, str(path))]
 
 
 def _tdms(path: Path) -> list[LogTable]:
     """Return one table per group and length of channels. Waveforms without a column `time` get one."""
-    groups = _read(path, "nptdms", lambda library: library.TdmsFile.read(path).groups())
     tables: list[LogTable] = []
-    for group in groups:
+    for group in _library(path, "nptdms").TdmsFile.read(path).groups():
         for length in dict.fromkeys(len(channel) for channel in group.channels()):
             channels = {channel.name: channel for channel in group.channels() if len(channel) == length}
             columns = {name: channel[:] for name, channel in channels.items()}
@@ -61,21 +67,17 @@ def _tdms(path: Path) -> list[LogTable]:
 
 def _mdf(path: Path) -> list[LogTable]:
     """Return a table for every group of channels."""
-    library = _read(path, "asammdf", lambda library: library.MDF(path))
     tables: list[LogTable] = []
-    begin = library.header.start_time
-    for number, group in enumerate(library.groups):
-        master = library.masters_db.get(number)
-        signals = [library.get(group=number, index=index) for index in range(len(group.channels)) if index != master]
-        numeric = [
-            signal for signal in signals if signal.samples.dtype.kind in "iufb" and signal.samples.ndim == 1 and len(signal)
-        ]
-        if numeric:
-            columns = {"time": _since(begin, numeric[0].timestamps), **{signal.name: signal.samples for signal in numeric}}
-            tables.append(
-                ArrayTable(str(path), columns, {s.name: s.unit for s in numeric} | {"time": "s"}, f"MDF, group {number}")
-            )
-    library.close()
+    with _library(path, "asammdf").MDF(path) as file:
+        begin = file.header.start_time
+        for number, group in enumerate(file.groups):
+            master = file.masters_db.get(number)
+            signals = [file.get(group=number, index=index) for index in range(len(group.channels)) if index != master]
+            numeric = [each for each in signals if each.samples.dtype.kind in "iufb" and each.samples.ndim == 1 and len(each)]
+            if numeric:
+                columns = {"time": _since(begin, numeric[0].timestamps), **{each.name: each.samples for each in numeric}}
+                units = {each.name: each.unit for each in numeric} | {"time": "s"}
+                tables.append(ArrayTable(str(path), columns, units, f"MDF, group {number}"))
     return tables
 
 
@@ -88,15 +90,11 @@ def _since(begin: Any, seconds: Any) -> Any:
     return np.datetime64(begin, "ns") + np.rint(np.asarray(seconds) * 1e9).astype("timedelta64[ns]")
 
 
-def _read(path: Path, module: str, read: Callable[[Any], Any]) -> Any:
+def _library(path: Path, module: str) -> Any:
     try:
-        library = import_module(module)
+        return import_module(module)
     except ImportError:
         raise UsageError(f"{path}: reading it needs {module.partition('.')[0]}, which is not installed. {EXTRA}") from None
-    try:
-        return read(library)
-    except Exception as error:  # libraries raise types of their own
-        raise BagError(f"{path}: cannot be read ({type(error).__name__}: {error}). Export it as CSV.") from None
 
 
 _READERS: dict[str, Callable[[Path], list[LogTable]]] = {

@@ -56,16 +56,14 @@ _WORDS = {
     ),
 }
 """Patterns of the words for each stream."""
-_OVER = (Stream.FORCES, Stream.IMU)
-"""Streams that take precedence if a header names several, as in 'cylinder force'."""
+_OVER = (Stream.FORCES, Stream.IMU)  # streams that take precedence if a header names several, as in 'cylinder force'
 _NOT_READINGS = (
     r"soll|setpoint|target|command|\bcmd|desired|\bref\b|speed|veloc|geschw|\brate\b|temp|druck|pressure|status|fehler|error"
     r"|alarm|quality|\bmin\b|\bmax\b|mittel|\bmean|\bavg|\brms\b|\bstd\b|offset|strom\b|current|spannung|volt|diff|abweich"
     r"|ventil|valve"
 )
 _INCLINATION = r"inclin|neigung|\bincl|tilt|horizont"
-_PATH = re.compile(r"::|\\|(?<=\w)\.(?=[A-Za-z])")
-"""Separators of device, message and signal in a name."""
+_PATH = re.compile(r"::|\\|(?<=\w)\.(?=[A-Za-z])")  # separators of device, message and signal in a name
 _TIME = (
     r"^(t|x|abs|rel|log)?[ _]*(time|zeit|timestamp|zeitstempel|stamp|datum|date|uhrzeit|clock|x value|t|sekunden|seconds)s?\b"
 )
@@ -109,8 +107,6 @@ def guess(name: str, unit: str, joints: int | None) -> Guess:
 
     Parameters
     ----------
-    name, unit : str
-        From `split_header`.
     joints : int or None
         Number of joints of the boom, if it is known.
     """

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..bag.metadata import dump
 from ..bag.session_sheet import SessionSheet
 from ..bag.session_writer import BY_NAME, LogTimes, named_message
-from ..bag.writer import SessionWriter
+from ..bag.writer import MessageWriter
 from ..config.yaml_text import plain
 from ..errors import BagError
 from ..messages.cdr_encoder import STAMP, NumberFields, Template
@@ -58,20 +58,11 @@ class ReadTable(NamedTuple):
 
 @dataclass(frozen=True)
 class ImportedSession:
-    """Result of an import.
-
-    Attributes
-    ----------
-    assignment : Assignment
-    read : dict of int to ReadTable
-        Rows and times by table index, for tables with channels.
-    counts : dict of str to int
-        Messages by topic.
-    """
+    """Result of an import."""
 
     assignment: Assignment
-    read: dict[int, ReadTable]
-    counts: dict[str, int]
+    read: dict[int, ReadTable]  # rows and times by table index, for tables with channels
+    counts: dict[str, int]  # messages by topic
 
 
 class _Readings(NamedTuple):
@@ -100,12 +91,8 @@ def import_session(
 
     Parameters
     ----------
-    tables : sequence of LogTable
-    out : Path
     given : ColumnFile
         Columns, times and time zone that headers do not give.
-    sheet : SessionSheet
-        Session metadata: version, scene and note.
     joints : int, optional
         Number of joints of the scene, if there is one.
     mapping : Path, optional
@@ -153,7 +140,7 @@ def _mapping(path: Path | None, assignment: Assignment, joints: int) -> tuple[st
         return text, topics
     document: dict[str, Any] = plain(text) or {}
     document = {**document, "sensors": {**(document.get("sensors") or {}), **dict.fromkeys(lacking, "none")}}
-    return dump(document), mapping_from(document, str(path), joints)
+    return dump(document), mapping_from(document, str(path or "mapping of channels without a column"), joints)
 
 
 def _read(assignment: Assignment, given: ColumnFile, zone: tzinfo | None) -> dict[int, ReadTable]:
@@ -226,7 +213,7 @@ def _write(out: Path, readings: list[_Readings], topics: Topics, joints: int, or
     order = np.lexsort((np.concatenate([kind.places for kind in kinds]), ranks, logs))
     counts: Counter[str] = Counter()
     inputs = {topics.inputs[each.stream].absolute: topics.inputs[each.stream] for each in readings}
-    with SessionWriter(out, inputs, {"origin": origin}) as bag:
+    with MessageWriter(out, inputs, {"origin": origin}) as bag:
         for first in range(0, len(order), TOGETHER):
             part = order[first : first + TOGETHER]
             encoded = []

@@ -17,8 +17,7 @@ from ..types import Array
 from .csv_layout import layout_of, number_in
 from .headers import split_header, unit_of
 
-Times = list[str] | NDArray[Any]
-"""Cells of a column of times: texts, numbers in a unit, or `datetime64`."""
+Times = list[str] | NDArray[Any]  # cells of a column of times: texts, numbers in a unit, or `datetime64`
 
 
 @dataclass
@@ -40,14 +39,8 @@ class LogTable(ABC):
 
     Parameters
     ----------
-    source : str
-        File or other origin, for messages.
-    headers : sequence of str
-        Column names as written in the file.
     units : sequence of str
         Units given outside the headers, empty strings if none.
-    layout : str
-        Description of the file format.
     """
 
     def __init__(self, source: str, headers: Sequence[str], units: Sequence[str], layout: str) -> None:

@@ -194,6 +194,11 @@ def _moments(table: LogTable, rows: LogRows, texts: list[str], header: str, orde
     order = order or (_order(table, matches, header) if has_date else "")
     naive, offsets = np.empty(len(matches), np.int64), np.zeros(len(matches), np.int64)
     for row, match in enumerate(matches):
+        if (match["zone"] is None) != (matches[0]["zone"] is None):
+            raise BagError(
+                f"{table.source}, {rows.place(row)}: {header} = {texts[row]!r} and {texts[0]!r}: only one of them has an "
+                "offset from UTC. Export all times with it, or none."
+            )
         try:
             naive[row] = _day(match["a"], match["b"], match["c"], order) + _clock(match)
             offsets[row] = _offset(match["zone"])

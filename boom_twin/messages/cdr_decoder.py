@@ -9,9 +9,11 @@ import struct
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
 from mcap.records import Schema
 
 from ..types import SECOND, Stream
+from .message_block import Integers, MessageBlock, gather
 from .topic_table import TYPES
 from .type_store import PADDING, decode, text_in
 
@@ -72,37 +74,35 @@ _LITTLE = b"\x00\x01"
 _ARRAYS = ("position", "velocity", "effort")
 _HEAD = _ORIGIN + 8  # behind the stamp
 _IMU_NUMBERS, _BEFORE_RATE, _BEFORE_FORCE = 37, 13, 25  # doubles of an Imu, and those before its vectors
-_VECTOR = struct.Struct("<4d")
 
 
 class Joints(NamedTuple):
-    """Fields read from a sensor_msgs/JointState: its names and one of its arrays."""
+    """Fields read from a sensor_msgs/JointState: its names and one of its arrays. Of many messages, a number is an array."""
 
     name: tuple[str, ...]
-    position: tuple[float, ...] = ()
-    effort: tuple[float, ...] = ()
+    position: tuple[Any, ...] = ()
+    effort: tuple[Any, ...] = ()
 
 
 class Vector(NamedTuple):
     """A geometry_msgs/Vector3."""
 
-    x: float
-    y: float
-    z: float
+    x: Any
+    y: Any
+    z: Any
 
 
 class Axes(NamedTuple):
-    """Fields read from a sensor_msgs/Imu; of covariances the first element."""
+    """Fields read from a sensor_msgs/Imu; of covariances the first element. Of many messages, a number is an array."""
 
     frame: str
     angular_velocity: Vector
-    angular_velocity_covariance: tuple[float]
+    angular_velocity_covariance: tuple[Any]
     linear_acceleration: Vector
-    linear_acceleration_covariance: tuple[float]
+    linear_acceleration_covariance: tuple[Any]
 
 
-MOST_HEADS = 8
-"""Number of heads kept for one topic: a bus may send every joint in a message of its own."""
+MOST_HEADS = 8  # number of heads kept for one topic: a bus may send every joint in a message of its own
 
 
 class CdrDecoder:
@@ -148,28 +148,71 @@ class CdrDecoder:
             self._heads = [(data[_HEAD:end], end, text), *self._heads[: MOST_HEADS - 1]]
         return stamp, msg
 
+    def read_many(self, block: MessageBlock) -> tuple[Integers, Any] | None:
+        """Return stamps (ns) and one message with arrays (k,) for numbers; None unless all have one layout, which is known."""
+        first, size, is_imu = block.data(0), int(block.ends[0] - block.starts[0]), self._type == TYPES[Stream.IMU]
+        known = next((each for each in self._heads if first[_HEAD : each[1]] == each[0]), None)
+        if known is None or first[:2] != _LITTLE or (block.ends - block.starts != size).any():
+            return None
+        _, end, text = known
+        if (_axes(first, end, text) if is_imu else _joints(first, end, text, self._field)) is None:
+            return None
+        arrays = [] if is_imu else _arrays(first, end)[0]
+        rows = gather(block.content, block.starts, size)
+        alike = slice(_ORIGIN), slice(_HEAD, end), *(slice(each.length, each.length + 4) for each in arrays)
+        if any((rows[:, each] != rows[0, each]).any() for each in alike):
+            return None
+        times = rows[:, _ORIGIN:_HEAD].copy()
+        stamps = times.view("<i4")[:, 0] * np.int64(SECOND) + times.view("<u4")[:, 1]
+        _, place, count = _Place(0, _aligned(end), _IMU_NUMBERS) if is_imu else arrays[_ARRAYS.index(self._field)]
+        numbers = tuple(rows[:, place : place + 8 * count].copy().view("<f8").T)
+        return stamps, _axes_of(text, numbers) if is_imu else Joints(text)._replace(**{self._field: numbers})
+
+
+class _Place(NamedTuple):
+    """Array in a message: offsets of its length and of its first number, and how many numbers it has."""
+
+    length: int
+    first: int
+    numbers: int
+
+
+def _aligned(place: int) -> int:
+    """Return the offset of a double that is written at `place` or behind it."""
+    return place + -(place - _ORIGIN) % 8
+
+
+def _arrays(data: bytes, place: int) -> tuple[list[_Place], int]:
+    """Return the arrays of a JointState whose names end at `place`, and the end of the last one."""
+    found = []
+    for _ in _ARRAYS:
+        length = place + -place % 4
+        place = length + 4
+        if count := int.from_bytes(data[length:place], "little"):
+            place = _aligned(place)
+        found.append(_Place(length, place, count))
+        place += 8 * count
+    return found, place
+
 
 def _joints(data: bytes, place: int, names: tuple[str, ...], field: str) -> Joints | None:
     """Return the fields of a JointState whose names end at `place`; None if it is not whole."""
-    found, numbers = place, 0
-    for each in _ARRAYS:
-        place += -place % 4 + 4
-        if count := int.from_bytes(data[place - 4 : place], "little"):
-            place += -(place - _ORIGIN) % 8
-        if each == field:
-            found, numbers = place, count
-        place += 8 * count
-    if not place <= len(data) <= place + PADDING:
+    arrays, end = _arrays(data, place)
+    if not end <= len(data) <= end + PADDING:
         return None
-    values = struct.unpack_from(f"<{numbers}d", data, found)
-    return Joints(names, values) if field == _ARRAYS[0] else Joints(names, (), values)
+    _, first, count = arrays[_ARRAYS.index(field)]
+    return Joints(names)._replace(**{field: struct.unpack_from(f"<{count}d", data, first)})
 
 
 def _axes(data: bytes, place: int, frame: str) -> Axes | None:
     """Return the fields of an Imu whose frame ends at `place`, before numbers at fixed offsets; None if it is not whole."""
-    place += -(place - _ORIGIN) % 8
+    place = _aligned(place)
     if not 0 <= len(data) - place - 8 * _IMU_NUMBERS <= PADDING:
         return None
-    *rate, rate_covariance = _VECTOR.unpack_from(data, place + 8 * _BEFORE_RATE)
-    *force, covariance = _VECTOR.unpack_from(data, place + 8 * _BEFORE_FORCE)
-    return Axes(frame, Vector(*rate), (rate_covariance,), Vector(*force), (covariance,))
+    return _axes_of(frame, struct.unpack_from(f"<{_IMU_NUMBERS}d", data, place))
+
+
+def _axes_of(frame: str, numbers: Any) -> Axes:
+    """Return the fields of an Imu by all its numbers."""
+    rate, force = (numbers[first : first + 4] for first in (_BEFORE_RATE, _BEFORE_FORCE))
+    return Axes(frame, Vector(*rate[:3]), (rate[3],), Vector(*force[:3]), (force[3],))

@@ -13,10 +13,8 @@ from .encoded_block import Bytes
 from .topic_table import FRAME
 from .type_store import fill_header, jazzy
 
-ORIGIN = 4
-"""Bytes of encapsulation, from after which CDR aligns."""
-STAMP = 1_365_991_213
-"""Seconds that stand for the stamp, in every header of a message."""
+ORIGIN = 4  # bytes of encapsulation, from after which CDR aligns
+STAMP = 1_365_991_213  # seconds that stand for the stamp, in every header of a message
 
 _DOUBLE, _SINGLE = 0x7E37_E43C_8800_0000, 0x7E96_7600
 """Bits of the first placeholder of either width, about 1e300 and 1e38; the next ones count up. No constant comes near them."""
@@ -50,8 +48,6 @@ class Template:
     ----------
     messages : sequence of (str, message of rosbags)
         Type and message. Its numbers are constants or from `fields`, and its stamps are `STAMP` s.
-    fields : NumberFields
-        Placeholders in the messages.
 
     Attributes
     ----------
@@ -82,8 +78,6 @@ class Template:
 
         Parameters
         ----------
-        stamps : ndarray of int64, shape (k,)
-            Nanoseconds, for all headers.
         doubles : ndarray, shape (k, d)
             Numbers in the order of the placeholders.
         singles : sequence of float

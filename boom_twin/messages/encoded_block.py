@@ -13,36 +13,18 @@ Bytes = NDArray[np.uint8]
 
 
 class EncodedRows(NamedTuple):
-    """Messages of one topic and one length.
-
-    Attributes
-    ----------
-    key : str
-        Key of the topic.
-    places : ndarray of int64, shape (k,)
-        Index of each message in the block.
-    data : ndarray of uint8, shape (k, length)
-        Bytes of each message; contiguous, not empty.
-    """
+    """Messages of one topic and one length."""
 
     key: str
-    places: Integers
-    data: Bytes
+    places: Integers  # index of each message in the block; shape (k,)
+    data: Bytes  # bytes of each message; contiguous, not empty; shape (k, length)
 
 
 class EncodedBlock(NamedTuple):
-    """Encoded messages in the order of writing.
+    """Encoded messages in the order of writing."""
 
-    Attributes
-    ----------
-    log_times : ndarray of int64, shape (n,)
-        Log time of each message, ns.
-    rows : list of EncodedRows
-        Groups that together have every index from 0 to n - 1 once.
-    """
-
-    log_times: Integers
-    rows: list[EncodedRows]
+    log_times: Integers  # log time of each message, ns; shape (n,)
+    rows: list[EncodedRows]  # groups that together have every index from 0 to n - 1 once
 
 
 class EncodedBlockBuilder:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -37,10 +38,11 @@ _REMEDIES = {
     "leave it out for an encoder.",
     "drive": "Give angles for a boom without stroke transducers; else leave it out.",
     "depth": "Give a number of messages.",
-    "delay": "Give the seconds by which the stamps come after the readings.",
+    "delay": "Give the seconds by which the stamps come after the readings, or auto.",
     "section": "Give the number of a section, 1 at the base.",
     "at": "Give the distance from the section's inboard pivot along it, m.",
     "turned": "Give the angle of the sensor's x axis to the section, rad, positive anticlockwise.",
+    "frame_id": "Give header.frame_id of its messages.",
     "bore": "Give a list of diameters, m, one for each cylinder.",
     "rod": "Give a list of diameters, m, one for each cylinder.",
     "place": "Give section, at and turned.",
@@ -55,7 +57,6 @@ def load_mapping(path: Path | None = None, joints: int | None = None) -> Topics:
 
     Parameters
     ----------
-    path : Path, optional
     joints : int, optional
         Number of joints of the scene, if known. Channels beyond it are then faults, too.
 
@@ -242,6 +243,8 @@ def _input_faults(topics: Topics) -> Iterator[Fault]:
             yield Fault(f"inputs.{stream.value}.bore", topic.bore, "only cylinder_pressures has it", "Remove the key.")
         if topic.place is not None and SENSORS[stream].is_named:
             yield Fault(f"inputs.{stream.value}.place", "given", "only IMUs and points have a place", "Remove the key.")
+        if topic.frame_id is not None and SENSORS[stream].is_named:
+            yield Fault(f"inputs.{stream.value}.frame_id", topic.frame_id, "only IMUs and points have it", "Remove the key.")
         if topic.place is None and SENSORS[stream].is_placed and not SENSORS[stream].is_named:
             told = "it must be there: section, at (m), turned (rad)"
             yield Fault(f"inputs.{stream.value}.place", None, told, "Give {} for the tip.")
@@ -250,4 +253,5 @@ def _input_faults(topics: Topics) -> Iterator[Fault]:
     drive, named = (Stream.ANGLES, "an angle") if topics.drive == "angles" else (Stream.STROKES, "a stroke")
     if delay := topics.inputs[drive].delay:
         bound = f"every output has the stamp of {named} sample, so the other streams' delays count against it"
-        yield Fault(f"inputs.{drive.value}.delay", delay, bound, f"Give the others {-delay:g} instead.")
+        others = "auto" if isnan(delay) else f"{-delay:g}"
+        yield Fault(f"inputs.{drive.value}.delay", delay, bound, f"Give the others {others} instead.")

@@ -16,12 +16,9 @@ from .type_store import fill_xz, new_message
 
 POINT = struct.Struct("<3d")
 LINE_STRIP, TEXT, ADD = 4, 9, 0
-LIFETIME = 1
-"""Lifetime of a marker, s."""
-TRACE = 5_000_000_000
-"""Duration of the tip's trace, ns."""
-TEXT_HEIGHT = 0.35
-"""Height of the text, m."""
+LIFETIME = 1  # lifetime of a marker, s
+TRACE = 5_000_000_000  # duration of the tip's trace, ns
+TEXT_HEIGHT = 0.35  # height of the text, m
 
 Colour = tuple[float, float, float, float]
 BOOM: Colour = (0.90, 0.45, 0.10, 1.0)
@@ -47,12 +44,8 @@ class ShapeMarkers:
 
     Parameters
     ----------
-    exaggeration : float
-        Factor of the displacements.
     force_scale : float
         Force that has the full colour, N.
-    frame : str
-        Frame of all markers.
     """
 
     def __init__(self, exaggeration: float, force_scale: float, frame: str = FRAME) -> None:

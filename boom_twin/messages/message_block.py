@@ -13,24 +13,12 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MessageBlock:
-    """Encoded messages in the order of processing.
+    """Encoded messages in the order of processing."""
 
-    Attributes
-    ----------
-    content : bytes
-        Bytes of all messages; may hold others.
-    sources : ndarray of int64, shape (k,)
-        Source of each message, a number defined by the maker of the block.
-    log_times : ndarray of uint64, shape (k,)
-        Log time of each message, ns.
-    starts, ends : ndarray of int64, shape (k,)
-        Offsets of the start and the end of each message in `content`.
-    """
-
-    content: bytes
-    sources: Integers
-    log_times: NDArray[np.uint64]
-    starts: Integers
+    content: bytes  # bytes of all messages; may hold others
+    sources: Integers  # source of each message, a number defined by the maker of the block; shape (k,)
+    log_times: NDArray[np.uint64]  # log time of each message, ns; shape (k,)
+    starts: Integers  # starts, ends: offsets of the start and the end of each message in `content`; shape (k,)
     ends: Integers
 
     def __len__(self) -> int:

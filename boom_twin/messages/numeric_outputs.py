@@ -37,8 +37,7 @@ ESTIMATED_NUMBERS = (
     *(f"{kind}{entry}" for kind in ("", "velocity_", "acceleration_") for entry in COVARIANCE),
 )  # fmt: skip
 """Numbers of an estimate's row, see `boom_twin.deviation.estimate_row.WIDTH`, up to its variances of the load."""
-TURN = ("sine_of_half", "cosine_of_half")
-"""Sine and cosine of half the angle of the estimate, for a quaternion."""
+TURN = ("sine_of_half", "cosine_of_half")  # sine and cosine of half the angle of the estimate, for a quaternion
 
 JOINTS = len(TIP_NUMBERS)  # behind the joints' angles: strokes, cylinders' forces, the tip's joints, the estimate
 

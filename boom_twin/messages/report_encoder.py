@@ -98,10 +98,6 @@ class ReportEncoder:
 
     Parameters
     ----------
-    scene : Scene
-        Scene of the reports.
-    settings : Settings
-        Settings of the drawing ``shape``.
     frame : str
         Frame in all headers, that of the base.
     """
@@ -132,7 +128,6 @@ class ReportEncoder:
 
         Parameters
         ----------
-        report : Report
         is_wanted : callable
             Returns True for an output that is wanted; by default for all.
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import SECOND, Sample, Stream
+from ..types import SECOND, Array, Sample, Stream
 
 LONGEST_CYCLE = SECOND  # ns between stamps of one cycle; a twin needs several strokes a second
 CONTESTED_FOR = SECOND  # ns without a contradiction, after which a stream has one source again
@@ -44,8 +44,6 @@ class SampleAssembler:
 
     Parameters
     ----------
-    wanted : dict of Stream to ndarray of bool, shape (channels,)
-        True for channels with a sensor.
     oddities : Counter
         Counter of ``names apart``, ``missing names`` and ``two sources``.
     drive : Stream
@@ -73,6 +71,19 @@ class SampleAssembler:
         """Yield the incomplete cycle of every stream after the last message."""
         for line in self._lines.values():
             yield from self._ended(line)
+
+    def is_regular(self, stream: Stream, stamps: NDArray[np.int64], frame: str) -> bool:
+        """Return True if messages with all names at these stamps (ns) are samples as they stand, and nothing else."""
+        line = self._lines[stream]
+        if line.group is not None or stream is self._drive:
+            return line.group is None
+        known = np.concatenate([[each.stamp for each in line.newest[-1:]], stamps])
+        return line.contested is None and frame == (line.frame or frame) and bool((known[1:] != known[:-1]).all())
+
+    def note(self, stream: Stream, stamps: NDArray[np.int64], values: Array, frame: str) -> None:
+        """Keep the newest two of such samples, values (k, channels)."""
+        line, newest = self._lines[stream], [Sample(stream, int(stamps[row]), values[row]) for row in (-2, -1)]
+        line.before, line.newest, line.frame = newest[:1], newest[1:], frame
 
     def _gathered(self, line: _Line, sample: Sample) -> Iterator[Sample]:
         """Yield the cycle that ends before a message with some of the names, and the one that is complete with it."""

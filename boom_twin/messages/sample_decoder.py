@@ -13,24 +13,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..types import LIMIT, SECOND, SENSORS, Array, Sample, Stream
-from .cdr_decoder import Axes
+from .cdr_decoder import Axes, Vector
+from .message_block import Integers
 from .sample_assembler import Reading, SampleAssembler
 from .topic_table import Topics, factor, load_topics
 
-LATEST = 2**31 * SECOND
-"""First stamp beyond the range of a message, ns."""
+LATEST = 2**31 * SECOND  # first stamp beyond the range of a message, ns
 
-MOST_NAMES = 1000
-"""Limit for the number of names in a message; a machine has some tens of them."""
+MOST_NAMES = 1000  # limit for the number of names in a message; a machine has some tens of them
 
-KEPT = 16
-"""Number of lists of names that are remembered for one stream: a bus may send every joint in a message of its own."""
+KEPT = 16  # number of lists of names that are remembered for one stream: a bus may send every joint in a message of its own
 
-NO_MEASUREMENT = -1.0
-"""First element of a covariance where the quantity is not measured (REP-145)."""
+NO_MEASUREMENT = -1.0  # first element of a covariance where the quantity is not measured (REP-145)
 
-_ABSENT = float("nan")
-"""Value of a channel that a message does not have, distinguished by identity from a reading of NaN."""
+_ABSENT = float("nan")  # value of a channel that a message does not have, distinguished by identity from a reading of NaN
 
 
 def stamp_of(msg: Any) -> int:
@@ -112,6 +108,7 @@ ODDITIES = {
     "not finite": "a reading without a value (NaN or infinity); it is left out",
     "absurd magnitude": f"above {LIMIT:g} in a message; that value is left out",
     "no measurement": "an Imu says by linear_acceleration_covariance[0] = -1 that it has none (REP-145); it is left out",
+    "another frame": "header.frame_id is not that of the mapping: another sensor, or other axes; the message is left out",
     "no usable value": "nothing of a message could be used",
     "no stamp": "header.stamp is 0; the message is left out: let its driver set header.stamp to the time of the reading",
     "impossible stamp": "before 1970, or more seconds than a message can hold; the message is left out",
@@ -124,25 +121,15 @@ class SampleDecoder:
 
     Parameters
     ----------
-    joints : int
-        Number of joints of the scene, n.
     topics : Topics, optional
         Topics and sensors of the rig; those of the package by default.
 
     Attributes
     ----------
-    oddities : Counter
-        Count of each of the irregularities `ODDITIES`.
-    other_boom_names : dict of Stream to list of str
-        Names in the newest message that has names of another boom.
     strange_names : dict of Stream to tuple of list of str
         Names missing in the first message that also had names unknown to the scene, and those unknown names.
     delays : dict of Stream to int
         Time from the stamp of a sample to that of its message, ns.
-    refused : int
-        Number of messages without a usable value; one without any names and values is not counted.
-    assembler : SampleAssembler
-        Assembler of samples from messages.
     """
 
     def __init__(self, joints: int, topics: Topics | None = None) -> None:
@@ -152,13 +139,14 @@ class SampleDecoder:
         pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
         self._sharing = pair if topics.is_shared else {}
         self.delays = {stream: topics.delay(stream) for stream in self._channels}
+        self._frames = {stream.value: topic.frame_id for stream, topic in topics.inputs.items()}
         self._areas = topics.areas
-        self.refused = 0
+        self.refused = 0  # number of messages without a usable value; one without any names and values is not counted
         self._by_axis = {stream for stream, kind in SENSORS.items() if not kind.is_named}
-        self.oddities: Counter[str] = Counter()
+        self.oddities: Counter[str] = Counter()  # count of each of the irregularities `ODDITIES`
         wanted = {stream: each.wanted for stream, each in self._channels.items()}
         self.assembler = SampleAssembler(wanted, self.oddities, topics.stroke_reading.stream)
-        self.other_boom_names: dict[Stream, list[str]] = {}
+        self.other_boom_names: dict[Stream, list[str]] = {}  # names in the newest message that has names of another boom
         self.strange_names: dict[Stream, tuple[list[str], list[str]]] = {}
 
     def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> list[Sample]:
@@ -168,6 +156,45 @@ class SampleDecoder:
         self.refused += not readings and self.oddities.total() > odd
         found = [each for reading in readings for each in self.assembler.take(reading)]
         self.refused += self.assembler.refused - contested
+        return found
+
+    def many(self, streams: Iterable[Stream], stamps: Integers, msg: Any) -> list[tuple[Stream, Integers, Array]] | None:
+        """Return streams, stamps (k,) in ns and values (k, channels) of the samples of many messages; None if any is irregular.
+
+        Parameters
+        ----------
+        streams : iterable of Stream
+            As for `samples`.
+        stamps : ndarray of int64, shape (k,)
+            At least two.
+        msg : message with arrays (k,) for numbers
+            From `boom_twin.messages.cdr_decoder.CdrDecoder.read_many`.
+        """
+        found, frame = list[tuple[Stream, Integers, Array]](), msg.frame if isinstance(msg, Axes) else ""
+        for stream in streams:
+            channels, kind, taken = self._channels[stream], SENSORS[stream], stamps - self.delays[stream]
+            columns, names = getattr(msg, kind.field), Vector._fields if isinstance(msg, Axes) else msg.name
+            if isinstance(msg, Axes):
+                places = [names.index(axis) if axis else -1 for axis in channels.names]
+                is_absent = getattr(msg, f"{kind.field}_covariance")[0] == NO_MEASUREMENT
+                if kind.beside and is_absent.all():
+                    continue
+                is_regular = not is_absent.any()
+            else:
+                places, *_, is_regular = channels.look(names)
+                is_regular &= len(columns) == len(names)
+            own = [i for i, place in enumerate(places) if place >= 0]
+            if not (is_regular and own and not kind.gives and ((stamps != 0) & (taken > 0) & (taken < LATEST)).all()):
+                return None
+            values = np.full((len(stamps), len(places)), np.nan)
+            for i in own:
+                zero, scale = channels.scales[i]
+                values[:, i] = (columns[places[i]] - zero) * scale
+            if not (np.abs(values[:, own]) <= LIMIT).all() or not self.assembler.is_regular(stream, taken, frame):
+                return None
+            found.append((stream, taken, in_range(values, *channels.range) if stream is Stream.ANGLES else values))
+        for each in found:
+            self.assembler.note(*each, frame)
         return found
 
     def put(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:
@@ -182,6 +209,10 @@ class SampleDecoder:
         if not (stamp_ns and 0 < taken < LATEST):
             self.oddities["impossible stamp" if stamp_ns else "no stamp"] += 1
             return None
+        frame = "" if is_by_name else msg.frame if isinstance(msg, Axes) else msg.header.frame_id
+        if frame != (self._frames.get(SENSORS[stream].beside or stream.value) or frame):
+            self.oddities["another frame"] += not SENSORS[stream].beside
+            return None
         raw, is_whole = self._by_name(msg, stream) if is_by_name else (self._by_axes(msg, stream), True)
         if raw is None:
             return None
@@ -193,7 +224,6 @@ class SampleDecoder:
         if isnan(values[0]) and all(map(isnan, values)):
             self.oddities["no usable value"] += 1
             return None
-        frame = "" if is_by_name else msg.frame if isinstance(msg, Axes) else msg.header.frame_id
         array = in_range(np.array(values), *channels.range) if stream is Stream.ANGLES else np.array(values)
         return Reading(Sample(stream, taken, array), is_whole, frame)
 

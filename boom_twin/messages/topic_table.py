@@ -6,11 +6,11 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from functools import cache
-from math import hypot, pi, radians
+from math import hypot, isnan, nan, pi, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, WrapValidator
 
 from ..config.settings import Settings
 from ..config.yaml_text import read_plain
@@ -73,9 +73,9 @@ NO_AREAS = (
     "inputs.cylinder_pressures: bore and rod of the cylinders are not known. Give `oil: {bore, rod, ..}` to each "
     "cylinder of the scene, or bore and rod (lists, m) to inputs.cylinder_pressures in the mapping."
 )
+_OR_AUTO = WrapValidator(lambda value, check: nan if value == "auto" else check(value))
 NODE = "boom_twin"
-FRAME = "base_link"
-"""Frame of the base, in which outputs are given unless a mapping or a parameter names another."""
+FRAME = "base_link"  # frame of the base, in which outputs are given unless a mapping or a parameter names another
 TIP_JOINTS = ("tip_dx", "tip_dz", "tip_pitch")
 """Displacement of the tip from that of rigid sections: along and across the last section, m, and its rotation, rad."""
 DEFAULT_FILE = Path(__file__).parent.parent / "msg_config" / "topics.yaml"
@@ -153,15 +153,12 @@ class Topic(_Entry):
 
 
 class InputTopic(Topic):
-    """One topic of readings.
+    """One topic of readings. ``delay`` is NaN where it is estimated (``auto``)."""
 
-    ``delay`` is the time from reading to stamp, s. ``reads`` is the quantity that stroke transducers read, if known.
-    ``place`` is where an IMU sits or a point is. ``bore`` and ``rod`` are diameters of cylinders with pressures, m.
-    """
-
-    delay: Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)] = 0.0
+    delay: Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False), _OR_AUTO] = 0.0
     reads: Literal["length", "drive"] | None = None
     place: SensorPlace | None = None
+    frame_id: Annotated[str, Field(min_length=1, max_length=200)] | None = None
     bore: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
     rod: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
 
@@ -185,8 +182,7 @@ class Topics(_Entry):
     outputs: dict[Output, Topic]
     events: EventTopic
     sensors: dict[str, Sensor] = {}
-    absent: frozenset[str] = frozenset()
-    """Channels without a sensor, marked by ``none`` in the mapping."""
+    absent: frozenset[str] = frozenset()  # channels without a sensor, marked by ``none`` in the mapping
     ranges: tuple[tuple[float, float], ...] = ()
     """Lowest and highest angle of every joint, rad; empty where the scene is not known."""
     areas: tuple[tuple[float, float], ...] = ()
@@ -279,7 +275,13 @@ class Topics(_Entry):
     def delay(self, stream: Stream) -> int:
         """Return the time from the readings of a stream to their stamps, ns."""
         topic = self.inputs.get(Stream(SENSORS[stream].beside or stream))
-        return 0 if topic is None else round(topic.delay * SECOND)
+        return 0 if topic is None or isnan(topic.delay) else round(topic.delay * SECOND)
+
+    @property
+    def lagging(self) -> list[Stream]:
+        """Streams whose delay is estimated."""
+        found = {Stream(SENSORS[stream].gives or stream) for stream, topic in self.inputs.items() if isnan(topic.delay)}
+        return sorted(found, key=list(Stream).index)
 
     def sensors_of(self, stream: Stream, joints: int) -> dict[str, Sensor]:
         """Return the sensors of a stream by channel, in the order of its samples."""

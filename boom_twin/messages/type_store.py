@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
+from rosbags.interfaces.typing import Typesdict
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
@@ -34,8 +35,13 @@ def jazzy() -> Typestore:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
-MOST_TEXTS = 100
-"""Texts of a message that may be in another encoding than UTF-8."""
+def other_than_jazzy(types: Typesdict) -> list[str]:
+    """Return the names of the types that Jazzy has, and defines otherwise."""
+    known = jazzy().fielddefs
+    return [name for name, (_, fields) in types.items() if name in known and list(known[name][1]) != list(fields)]
+
+
+MOST_TEXTS = 100  # texts of a message that may be in another encoding than UTF-8
 
 
 def text_in(data: bytes) -> str:
@@ -50,13 +56,6 @@ def decode(data: bytes, type_name: str) -> Any:
     """Return the message in `data`, which may have up to `PADDING` bytes after its end, as Fast DDS leaves there.
 
     The `Typestore`'s own decoder takes 3 bytes.
-
-    Parameters
-    ----------
-    data : bytes
-        CDR (``PLAIN_CDR``), of either byte order.
-    type_name : str
-        Type that Jazzy has.
 
     Raises
     ------

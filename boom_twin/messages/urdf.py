@@ -9,15 +9,13 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..kernels.elements.linkage import LINK_L
 from ..scene.kinematics import CYLINDER, LEFT, RIGHT, linkage
-from ..scene.schema import Cylinder, Scene, section_depth
+from ..scene.schema import Cylinder, Scene
 from .topic_table import FRAME, TIP_JOINTS
 
 NAME = "boom"
 TIP, TIP_RIGID, TIP_ALONG, TIP_ACROSS, IMU = "tip", "tip_rigid", "tip_along", "tip_across", "imu_link"
-UP_IS_POSITIVE = "0 -1 0"
-"""Axis of every revolute joint (REP-103: x forward, z up): a positive angle raises what it turns."""
-EYE = 0.1
-"""Length of the rod's eye outside the barrel over the length of the closed cylinder."""
+UP_IS_POSITIVE = "0 -1 0"  # axis of every revolute joint (REP-103: x forward, z up): a positive angle raises what it turns
+EYE = 0.1  # length of the rod's eye outside the barrel over the length of the closed cylinder
 BARREL_RADIUS, ROD_RADIUS, BAR = 0.045, 0.025, 0.06
 """Dimensions for drawing: radii over the length of the closed cylinder, side of a link's bar over the link's length."""
 COLOURS = {"section": "0.55 0.62 0.70 1", "link": "0.35 0.40 0.46 1", "barrel": "0.90 0.45 0.10 1", "rod": "0.80 0.82 0.85 1"}
@@ -82,7 +80,7 @@ def urdf(scene: Scene) -> str:
 
 def _section(robot: Element, scene: Scene, i: int) -> None:
     """Add section `i` (0-based) and the joint that turns it."""
-    name, depth = f"section_{i + 1}", section_depth(scene, i)
+    name, depth = f"section_{i + 1}", scene.sections[i].depth
     link = SubElement(robot, "link", name=name)
     _bar(link, (0.0, 0.0), (scene.sections[i].length, 0.0), depth, "section")
     low, high = (math.radians(angle) for angle in scene.joints[i].range_deg)

@@ -11,10 +11,8 @@ from .topic_table import FRAME, load_topics
 FOLDER = Path(str(files("boom_twin") / "msg_config"))
 RVIZ, FOXGLOVE, PLOTJUGGLER = (FOLDER / name for name in ("boom_twin.rviz", "foxglove.json", "plotjuggler.xml"))
 VIEWS = (RVIZ, FOXGLOVE, PLOTJUGGLER)
-DESCRIPTION = "/robot_description"
-"""Topic of robot_state_publisher."""
-TF_PREFIX = "TF Prefix:"
-"""Key of the frame prefix in RViz's display of a robot model."""
+DESCRIPTION = "/robot_description"  # topic of robot_state_publisher
+TF_PREFIX = "TF Prefix:"  # key of the frame prefix in RViz's display of a robot model
 
 
 def view_text(text: str, namespace: str = "", frame_prefix: str = "") -> str:

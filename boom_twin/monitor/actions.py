@@ -22,8 +22,7 @@ RECORDER_TIMEOUT = 2 * PATIENCE
 class RecorderProcess:
     """Recorder in a child process, at most one at a time.
 
-    Every recording gets a directory in `folder`, named by its time (UTC). `options` are more arguments of
-    ``boom_twin record``.
+    ``boom_twin record`` with `options` into a new directory of `folder`.
     """
 
     def __init__(self, folder: Path, options: Sequence[str] = ()) -> None:
@@ -61,13 +60,10 @@ class RecorderProcess:
             end_process(self._process, RECORDER_TIMEOUT, signal.SIGINT)
 
 
-NOTE_LENGTH = 500
-"""Largest number of characters of a note."""
-NO_TEXT = ("Cc", "Cs")
-"""Unicode categories that cannot be published: control characters and surrogates."""
+NOTE_LENGTH = 500  # largest number of characters of a note
+NO_TEXT = ("Cc", "Cs")  # unicode categories that cannot be published: control characters and surrogates
 ACTS = ("mark", "acknowledge", "record")
-AT_NODE = "acknowledge-at-node"
-"""Permission to release ended alarms at the node, too, by ``acknowledge``."""
+AT_NODE = "acknowledge-at-node"  # permission to release ended alarms at the node, too, by ``acknowledge``
 
 
 class ViewerActions:

@@ -10,24 +10,16 @@ from ..types import SECOND
 from .data.feed import Feed
 from .data.status import ListedAlarm
 
-BEGIN, CAUSE, END = "begin", "cause", "end"
-"""Kinds of changes."""
-MICRO = 1000  # ns
+BEGIN, CAUSE, END = "begin", "cause", "end"  # kinds of changes
 
 
 class AlarmWatch:
-    """Watch of one feed's alarms with channel and kind: alarms of the rig's health, and gaps.
-
-    Attributes
-    ----------
-    begun : Counter
-        Alarms so far, by channel and kind.
-    """
+    """Watch of one feed's alarms with channel and kind: alarms of the rig's health, and gaps."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
         self._known: dict[int, tuple[str | None, bool]] = {}  # (cause, has ended) by number of the alarm
-        self.begun: Counter[tuple[str, str]] = Counter()
+        self.begun: Counter[tuple[str, str]] = Counter()  # alarms so far, by channel and kind
 
     def active(self) -> list[ListedAlarm]:
         """Return the active alarms."""
@@ -71,7 +63,6 @@ class AlarmWatch:
         }
 
     def _date(self, time: float) -> str:
-        """Return a session time (s) as the date of its stamp, UTC, to the microsecond."""
         stamp = self._feed.store.epoch + round(time * SECOND)
-        date = datetime.fromtimestamp(stamp // SECOND, UTC) + timedelta(microseconds=stamp % SECOND // MICRO)
+        date = datetime.fromtimestamp(stamp // SECOND, UTC) + timedelta(microseconds=stamp % SECOND // 1000)
         return date.isoformat(timespec="microseconds").replace("+00:00", "Z")

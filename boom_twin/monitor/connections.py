@@ -11,7 +11,6 @@ import asyncio
 import logging
 import sys
 import time
-from functools import partial
 from http import HTTPStatus
 from typing import Any
 
@@ -21,56 +20,38 @@ from ..system.terminal_text import printable
 from .access_control import POLICY
 
 LOG = logging.getLogger("boom_twin.monitor.connections")
-REQUEST_TIME = 5.0
-"""Timeout (s) of a connection's first complete request, and of each further one."""
-LOGGED_LENGTH = 200
-"""Largest length of a logged error message."""
-MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64
-"""Largest number of silent or accepted connections: in total, and of one address."""
+REQUEST_TIME = 5.0  # timeout (s) of a connection's first complete request, and of each further one
+LATE = f"it sent no request within {REQUEST_TIME:g} s"
+LOGGED_LENGTH = 200  # largest length of a logged error message
+MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64  # largest number of silent or accepted connections: in total, and of one address
 
 
 class Connections:
-    """All connections to one server: silent ones (no complete request yet), and accepted ones.
-
-    Each kind is in order of last use. If it is full, a new one replaces the oldest. `server` answers the requests.
-    """
+    """Connections to one server: silent ones, and those of which a request was accepted."""
 
     def __init__(self, server: web.Server) -> None:
         self._server = server
-        self._silent: list[Connection] = []
-        self._accepted: list[Connection] = []
+        self._all: dict[Connection, bool] = {}  # True if accepted; in order of last use
 
     def __call__(self) -> Connection:
         """Return a new connection, as `asyncio.loop.create_server` requires."""
         return Connection(self._server, self)
 
-    def begin(self, connection: Connection) -> None:
-        """Count a new connection that has sent nothing yet."""
-        self._count(self._silent, connection)
-
-    def accept(self, connection: Connection) -> None:
-        """Count a connection whose request was accepted."""
+    def count(self, connection: Connection, is_accepted: bool) -> None:
+        """Count a connection as the newest of its kind; cut off the oldest one if there are too many."""
         self.end(connection)
-        self._count(self._accepted, connection)
+        kind = [each for each, accepted in self._all.items() if accepted is is_accepted]
+        same = [each for each in kind if each.address == connection.address]
+        if len(same) >= MAX_OF_ADDRESS or len(kind) >= MAX_CONNECTIONS:
+            self.cut_off(same[0] if len(same) >= MAX_OF_ADDRESS else kind[0], "a newer one")
+        self._all[connection] = is_accepted
 
     def end(self, connection: Connection) -> None:
         """Stop counting a connection that is closed or became a viewer's."""
-        for kind in (self._silent, self._accepted):
-            if connection in kind:
-                kind.remove(connection)
+        self._all.pop(connection, None)
 
-    def expire(self, connection: Connection) -> None:
-        """Close a connection that sent no request in time."""
-        self._cut_off(connection, f"it sent no request within {REQUEST_TIME:g} s")
-
-    def _count(self, kind: list[Connection], connection: Connection) -> None:
-        """Add a connection of a kind, and close the oldest one if a limit is reached."""
-        same = [each for each in kind if each.address == connection.address]
-        if len(same) >= MAX_OF_ADDRESS or len(kind) >= MAX_CONNECTIONS:
-            self._cut_off(same[0] if len(same) >= MAX_OF_ADDRESS else kind[0], "a newer one")
-        kind.append(connection)
-
-    def _cut_off(self, connection: Connection, reason: str) -> None:
+    def cut_off(self, connection: Connection, reason: str) -> None:
+        """Close a connection without an answer."""
         self.end(connection)
         LOG.warning("cut off a connection of %s: %s", connection.address, reason)
         connection.abort()
@@ -92,8 +73,8 @@ class Connection(web.RequestHandler):
         """Start waiting for a request."""
         super().connection_made(transport)
         self.address = str((transport.get_extra_info("peername") or [""])[0])
-        self._deadline = asyncio.get_running_loop().call_later(REQUEST_TIME, partial(self._all.expire, self))
-        self._all.begin(self)
+        self._deadline = asyncio.get_running_loop().call_later(REQUEST_TIME, self._all.cut_off, self, LATE)
+        self._all.count(self, is_accepted=False)
 
     def connection_lost(self, exc: BaseException | None) -> None:
         """Stop counting the closed connection."""
@@ -104,7 +85,7 @@ class Connection(web.RequestHandler):
     def accept(self) -> None:
         """Count the connection as accepted."""
         self._cancel_deadline()
-        self._all.accept(self)
+        self._all.count(self, is_accepted=True)
 
     def become_viewer(self) -> None:
         """Stop counting the connection, because it is now a WebSocket."""
@@ -140,10 +121,8 @@ class Connection(web.RequestHandler):
             self._deadline = None
 
 
-LOG_PERIOD = 10.0
-"""Period (s) of the log's rate limit."""
-MAX_LOG_LINES = 3
-"""Largest number of records of one logger in a `LOG_PERIOD`."""
+LOG_PERIOD = 10.0  # period (s) of the log's rate limit
+MAX_LOG_LINES = 3  # largest number of records of one logger in a `LOG_PERIOD`
 
 
 class LogRateLimit(logging.Filter):

@@ -25,15 +25,11 @@ from .data.feed import Feed
 from .data.received_messages import text
 from .data.status import Severity
 from .data.store import Store
-from .server import Server
-from .serving import serving
+from .server import Server, serving
 
-CAPACITY = 150_000
-"""Rows kept of every table: twelve minutes at 200 Hz."""
-MOST_WAITING = 20_000
-"""Largest number of waiting samples; beyond it the oldest are dropped."""
-MOST_AT_ONCE = 200
-"""Largest number of samples in one poll, so that pages are served."""
+CAPACITY = 150_000  # rows kept of every table: twelve minutes at 200 Hz
+MOST_WAITING = 20_000  # largest number of waiting samples; beyond it the oldest are dropped
+MOST_AT_ONCE = 200  # largest number of samples in one poll, so that pages are served
 
 
 class SourceFeed(Feed):

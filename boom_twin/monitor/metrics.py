@@ -18,8 +18,7 @@ from .data.status import LEVELS, SILENCE, StatusLamp
 from .data.store import EVERY_STROKE, Table
 from .data.topic_rows import COMPARED, ESTIMATE, ESTIMATE_COLUMNS, RESIDUALS
 
-WINDOW = 10.0
-"""Window (s) of the root mean square of residuals."""
+WINDOW = 10.0  # window (s) of the root mean square of residuals
 AXES = ("x", "z")
 REMEDY = 'prometheus_client is not installed, and /metrics needs it. Run `pip install "boom_twin[monitor]"`.'
 
@@ -135,7 +134,6 @@ class Metrics:
     # -- rows and families --------------------------------------------------------------------------------------------
 
     def _fresh(self, name: str) -> Table | None:
-        """Return a table if its newest row is at most `SILENCE` old, else None."""
         store = self._feed.store
         table = store.tables.get(name)
         return table if table is not None and table.count and store.newest - table.newest <= SILENCE else None
@@ -161,7 +159,6 @@ class Metrics:
 
 
 def _rms(channel: str, values: Array) -> Iterator[tuple[str, float]]:
-    """Yield the channel and its root mean square, unless nothing was measured."""
     known = values[np.isfinite(values)]
     if len(known):
         yield channel, float(np.sqrt(np.mean(known**2)))

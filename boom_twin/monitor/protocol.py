@@ -77,8 +77,7 @@ def state(store: Store, now: float, time: float, dropped: DroppedMessages | None
 ACTIONS = {
     Severity.OFF: "unknown", Severity.OK: "go", Severity.WARN: "look", Severity.STALE: "unknown", Severity.ERROR: "look",
 }  # fmt: skip
-SWING = "swing"
-"""Status whose ERROR means: stop the boom."""
+SWING = "swing"  # status whose ERROR means: stop the boom
 
 
 def layout(store: Store) -> dict[str, Any]:

@@ -1,20 +1,23 @@
-"""HTTP and WebSocket server of the live page."""
+"""HTTP and WebSocket server of the live page, and the context in which it listens."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AsyncExitStack, suppress
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from errno import EADDRINUSE
+from functools import partial
 from pathlib import Path
 
 from aiohttp import web
 
 from ..errors import BoomTwinError, UsageError
 from ..texts import FILE as TEXTS
-from .access_control import POLICY, AccessControl
+from . import PORT
+from .access_control import POLICY, AccessControl, in_address
 from .actions import ViewerActions
 from .alarm_watch import AlarmWatch
-from .connections import Connection
+from .connections import Connection, Connections
 from .data.analyst import Analyst
 from .data.feed import Feed, SessionList
 from .metrics import Metrics
@@ -23,25 +26,17 @@ from .webhook import Webhook
 
 PAGE = Path(__file__).parent / "page"
 MAX_VIEWERS = 16
-MAX_REQUEST_BYTES = 4096
-"""Largest request of a page, bytes."""
-POLL_PERIOD = 1.0 / 60.0
-"""Seconds between two polls of the feed."""
-PEAK_PERIOD = 10.0
-"""Seconds between two spectra of a live session while no page is open."""
-ALARM_PERIOD = 1.0
-"""Seconds between two looks for changes of alarms."""
-HEARTBEAT = 60.0
-"""Seconds without an answer after which the connection of a viewer is closed."""
+MAX_REQUEST_BYTES = 4096  # largest request of a page, bytes
+POLL_PERIOD = 1.0 / 60.0  # seconds between two polls of the feed
+PEAK_PERIOD = 10.0  # seconds between two spectra of a live session while no page is open
+ALARM_PERIOD = 1.0  # seconds between two looks for changes of alarms
+HEARTBEAT = 60.0  # seconds without an answer after which the connection of a viewer is closed
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Server of the live page for one feed. With several `sessions`, it is the open one.
-
-    `webhook` posts changes of alarms.
-    """
+    """Server of the live page for one feed: of several `sessions`, the open one. `webhook` posts changes of alarms."""
 
     def __init__(
         self,
@@ -106,7 +101,6 @@ class Server:
         return socket
 
     async def _run(self, application: web.Application) -> AsyncIterator[None]:
-        """Poll the feed as long as the server runs."""
         self._analyst = Analyst(self._feed)
         async with AsyncExitStack() as stack:
             if self._webhook is not None:
@@ -125,7 +119,6 @@ class Server:
             await asyncio.sleep(POLL_PERIOD)
 
     async def _follow_alarms(self) -> None:
-        """Update counts and post changes of alarms of the feed shown."""
         while True:
             self._metrics.follow()
             for change in self._watch.changes():
@@ -134,7 +127,6 @@ class Server:
             await asyncio.sleep(ALARM_PERIOD)
 
     def _show(self, feed: Feed) -> None:
-        """Show `feed`, with its own alarms and counts."""
         self._feed, self._watch = feed, AlarmWatch(feed)
         self._metrics = Metrics(feed, self._watch)
 
@@ -182,3 +174,34 @@ def _stop_on_fault(task: asyncio.Task[None]) -> None:
     if not task.cancelled() and (error := task.exception()) is not None:
         asyncio.get_running_loop().call_exception_handler({"message": "the feed failed", "exception": error})
         raise web.GracefulExit
+
+
+BACKLOG = 128  # connections that may wait to be accepted; the kernel refuses more
+
+
+@asynccontextmanager
+async def serving(server: Server, access: AccessControl, host: str, port: int | None) -> AsyncIterator[str]:
+    """Serve pages within the context; provide their address.
+
+    If `port` is None, it is `PORT`, or any free port if that is taken. 0 is any free port. Raise OSError if `port` is taken.
+    """
+    runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
+    await runner.setup()
+    assert runner.server is not None
+    try:
+        listener = await _listen(Connections(runner.server), host, port)
+        number = listener.sockets[0].getsockname()[1]
+        yield f"http://{in_address(host)}:{number}/" + (f"?token={access.token}" if access.token else "")
+        listener.close()
+    finally:
+        await runner.cleanup()
+
+
+async def _listen(connections: Connections, host: str, port: int | None) -> asyncio.Server:
+    listen = partial(asyncio.get_running_loop().create_server, connections, host, backlog=BACKLOG)
+    try:
+        return await listen(PORT if port is None else port)
+    except OSError as error:
+        if port is not None or error.errno != EADDRINUSE:
+            raise
+        return await listen(0)

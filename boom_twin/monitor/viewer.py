@@ -21,24 +21,18 @@ from .data.feed import Feed, Playback, SessionList
 from .data.store import Table
 from .protocol import ROWS, alarms, dump, layout, pack, state
 
-PERIOD = 1.0 / 30.0
-"""Seconds between two messages of rows."""
+PERIOD = 1.0 / 30.0  # seconds between two messages of rows
 STATE_PERIOD = 0.5
 SPECTRUM_PERIOD = 1.0
-CHUNK = 8000
-"""Largest number of rows in a block."""
-BEHIND = 5.0
-"""Largest delay (s) of a page; beyond it, older rows are skipped."""
-HISTORY = 600.0
-"""Seconds of data that a page gets when it opens or seeks."""
-NEWEST_ROW_ONLY = "shape"
-"""Table of which only the newest row is sent."""
-MAX_REQUESTS = 40
-"""Largest number of requests of a page in a second."""
+CHUNK = 8000  # largest number of rows in a block
+BEHIND = 5.0  # largest delay (s) of a page; beyond it, older rows are skipped
+HISTORY = 600.0  # seconds of data that a page gets when it opens or seeks
+NEWEST_ROW_ONLY = "shape"  # table of which only the newest row is sent
+MAX_REQUESTS = 40  # largest number of requests of a page in a second
 
 
 class Viewer:
-    """Viewer of one prepared WebSocket. Feed, actions and analyst are common to all viewers.
+    """Viewer of one prepared WebSocket.
 
     `choose` opens one of the `sessions` by its index and returns a sentence for the viewer.
     """
@@ -125,10 +119,7 @@ class Viewer:
             await self._socket.send_str(told)
 
     async def _send_rows(self, position: float) -> None:
-        """Send all unsent rows, in messages of bounded size.
-
-        Rows that arrive meanwhile wait for the next turn.
-        """
+        """Send all unsent rows, in messages of bounded size; rows that arrive meanwhile wait for the next turn."""
         tables = list(self._feed.store.tables.values())[: self._tables]
         unsent = {number: self._unsent(table, position) for number, table in enumerate(tables)}
         while unsent:
@@ -145,7 +136,6 @@ class Viewer:
                 await self._socket.send_bytes(b"".join(blocks))
 
     def _unsent(self, table: Table, position: float) -> tuple[int, int]:
-        """Return the numbers of the first unsent row and of the one after the last."""
         end = table.count if self._playback is None else table.until(position)
         first = self._sent.get(table.name)
         if first is None:
@@ -168,7 +158,6 @@ class Viewer:
             await asyncio.sleep(SPECTRUM_PERIOD)
 
     async def _send_spectrogram(self, position: float) -> None:
-        """Send the unsent columns of the spectrogram."""
         generation = self._generation
         found = await self._analyst.spectrogram_between(max(self._spectrogram_until, position - HISTORY), position)
         if found is not None and generation == self._generation == self._feed.store.generation:
@@ -197,7 +186,6 @@ class Viewer:
     # -- in -----------------------------------------------------------------------------------------------------------
 
     async def _receive(self) -> None:
-        """Carry out requests; close the socket of a page that sends anything else."""
         second, count = 0.0, 0
         async for message in self._socket:
             now = time.monotonic()

@@ -16,27 +16,18 @@ from aiohttp import ClientError, ClientSession, ClientTimeout
 from ..errors import UsageError
 
 LOG = logging.getLogger("boom_twin.monitor.webhook")
-MAX_WAITING = 100
-"""Largest number of waiting messages; one more replaces the oldest."""
-PAUSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Pauses (s) before further attempts."""
-POST_TIME = 10.0
-"""Timeout (s) of one attempt."""
-CLOSING_TIME = 2.0
-"""Time (s) for waiting messages when the monitor ends."""
+MAX_WAITING = 100  # largest number of waiting messages; one more replaces the oldest
+PAUSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # pauses (s) before further attempts
+POST_TIME = 10.0  # timeout (s) of one attempt
+CLOSING_TIME = 2.0  # time (s) for waiting messages when the monitor ends
 TRY_AGAIN = (HTTPStatus.REQUEST_TIMEOUT, HTTPStatus.TOO_EARLY, HTTPStatus.TOO_MANY_REQUESTS)
 """Status codes below 500 after which another attempt may succeed."""
 
 
 class Webhook:
-    """Poster of JSON objects to `url`, one after the other, each with the name of this machine as ``host``.
+    """Poster of JSON objects to `url` (http or https, else UsageError), each with the name of this machine as ``host``.
 
     The log names the server only, because a path may hold a secret. Redirections are not followed.
-
-    Raises
-    ------
-    UsageError
-        `url` is not an address of http or https.
     """
 
     def __init__(self, url: str) -> None:
@@ -86,7 +77,6 @@ class Webhook:
                     self._waiting.task_done()
 
     async def _attempts(self, session: ClientSession, message: Mapping[str, Any]) -> str:
-        """Post a message; return the reason of failure, empty if it was accepted."""
         for pause in (*PAUSES, None):
             reason, may_succeed = await self._post(session, message)
             if not reason or not may_succeed:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..bag.reader import Session, read, scan
-from ..bag.session_model import mapping_of, scene_of, settings_of, strokes_of
+from ..bag.session_model import SessionScene, mapping_of, scene_of, settings_of, strokes_of
 from ..bag.session_sheet import kept
 from ..bag.time_window import WHOLE, TimeWindow
 from ..config.yaml_text import plain, read_plain
@@ -20,11 +20,13 @@ from ..errors import BagError, UsageError
 from ..messages.mapping import mapping_from
 from ..messages.topic_table import Sensor, Topics, usual
 from ..scene.edit import loaded
+from ..scene.load import SceneSource
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..twin.twin import Twin
 from ..types import SENSORS, Array, Change, Place, Stream, StrokeReading
 from ..wiring.check import Checked, Verdict, check
+from ..wiring.expected import RestModel
 from ..wiring.lag import Lag, lag_of
 from ..wiring.readings import Channel, Series, Window, is_checked
 from ..wiring.words import STROKES_ALONE, finding
@@ -32,6 +34,7 @@ from .session_samples import SessionSamples
 
 LOOK = 60.0  # s of a session that `wiring_of` reads
 LATE = 0.01  # s, smallest lag that is proposed as `delay`
+MOST_LAG = 0.08  # s, below which the estimator itself finds a lag
 SIGMAS = 4.0  # standard deviations by which a lag, or a reading as drive or length, has to be told
 ZERO = math.radians(0.15)  # zeros of encoders
 AXES = "x", "y", "z"
@@ -39,22 +42,14 @@ AXES = "x", "y", "z"
 
 @dataclass(frozen=True)
 class Commissioning:
-    """Result of the check of a session.
-
-    Attributes
-    ----------
-    checked : Checked
-    document : dict
-        Keys of the mapping that mends what the check is sure of.
-    lags : dict of Stream to Lag
-        Lag of each stream against the strokes; empty if it was not asked for, or the strokes are not known.
-    declared_reads, reads : StrokeReading
-        What stroke transducers read as declared, and as told by the encoders; None if it cannot be told.
-    """
+    """Result of the check of a session."""
 
     checked: Checked
-    document: dict[str, Any]
+    document: dict[str, Any]  # keys of the mapping that mends what the check is sure of
+    # lag of each stream against the strokes; empty if it was not asked for, or the strokes are not known
     lags: Mapping[Stream, Lag]
+    absent: list[str]  # channels that are in no message, proposed as ``none``
+    # declared_reads, reads: what stroke transducers read as declared, and as told by the encoders; None if it cannot be told
     declared_reads: StrokeReading
     reads: StrokeReading | None
 
@@ -72,10 +67,10 @@ class Commissioning:
     def has_proposal(self) -> bool:
         """Return True if a mapping is proposed."""
         is_other = self.reads is not None and self.reads is not self.declared_reads
-        return bool(self.late) or is_other or any(verdict.is_sure for verdict in self.wrong)
+        return bool(self.late) or is_other or bool(self.absent) or any(verdict.is_sure for verdict in self.wrong)
 
 
-def wiring_of(bag: Path, scene: str | Path | None, mapping: Path | None, window: TimeWindow) -> str:
+def wiring_of(bag: Path, scene: SceneSource | SessionScene, mapping: str | Path | None, window: TimeWindow) -> str:
     """Return one line on how the sensors of a session are wired, by its first `LOOK` seconds."""
     duration = LOOK if window.duration is None else min(LOOK, window.duration)
     try:
@@ -98,8 +93,8 @@ def is_late(lag: Lag) -> bool:
 
 def commission(
     bag: str | Path,
-    scene: str | Path | None = None,
-    mapping: Path | None = None,
+    scene: SceneSource | SessionScene = None,
+    mapping: str | Path | None = None,
     window: TimeWindow = WHOLE,
     with_lags: bool = True,
 ) -> Commissioning:
@@ -107,7 +102,6 @@ def commission(
 
     Parameters
     ----------
-    bag : path
     scene, mapping : path, optional
         By default those of the session, else those of the package.
     window : TimeWindow
@@ -123,30 +117,46 @@ def commission(
         Scene or mapping have faults.
     """
     session = scan(Path(bag))
-    own = scene_of(session.path, scene)
+    own, given = scene_of(session.path, scene), None if mapping is None else Path(mapping)
     joints = len(own.scene.joints)
-    mapped, document = mapping_of(session.path, mapping, joints), _document(session.path, mapping)
+    mapped, document = mapping_of(session.path, given, joints), _document(session.path, given)
     reads = strokes_of(session.path, mapped).reading
     settings = settings_of(session.path).settings
     series = readings_of(session, mapped.topics, joints, window)
     places = mapped.topics.places
-    found = check(loaded(own.scene, *settings.load), reads, declared(mapped.topics, joints), series, places=places)
+    model = RestModel(loaded(own.scene, *settings.load), reads, places)
+    found = check(model, declared(mapped.topics, joints), series)
     if found is None:
-        lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes"
+        names = [sensor.name for sensor in mapped.topics.sensors_of(Stream.STROKES, joints).values()]
+        heard = series[Stream.STROKES]
+        silent = [name for name in names if name not in heard or not np.isfinite(heard[name].values).any()]
+        without = f": {', '.join(silent)} never had a value" if silent else ""
+        lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes{without}"
         raise BagError(f"{lacking}. Give the boom's scene by --scene.")
     told = told_reading(found, reads)
     _mend(document, found, None if told is reads else told)
+    absent = [each.channel for each in found.verdicts if found.lacks(each) and each.channel not in mapped.topics.absent]
+    for channel in absent:
+        document.setdefault("sensors", {})[channel] = "none"
     lags: dict[Stream, Lag] = {}
     if with_lags and all(v.is_sure or not v.is_wrong for v in found.verdicts if v.stream is Stream.STROKES):
         topics = mapping_from(document, mapped.source, joints).of_scene(own.scene.joints)
         mounts = topics.mounts(joints)
-        twin = Twin(own.scene, settings, mounts, reads=told or reads, absent=topics.absent, places=topics.places)
+        sensing = topics.noise_of(settings), mounts, False, told or reads, topics.absent
+        twin = Twin(own.scene, *sensing, places=topics.places, lagging=topics.lagging)
         lags = _lags(twin, session, topics, window, found)
         for stream, lag in lags.items():
-            if is_late(lag):
+            if is_late(lag) and stream not in topics.lagging:
                 delay = round(topics.inputs[stream].delay + lag.lag, 3)
-                document.setdefault("inputs", {}).setdefault(stream.value, {})["delay"] = delay
-    return Commissioning(found, document, lags, reads, told)
+                entry = document.setdefault("inputs", {}).setdefault(stream.value, {})
+                entry["delay"] = "auto" if abs(delay) < MOST_LAG else delay
+        topics = mapping_from(document, mapped.source, joints).of_scene(own.scene.joints)
+        if any(stream in lags for stream in topics.lagging):
+            twin = Twin(own.scene, *sensing, places=topics.places, lagging=topics.lagging)
+            for _ in drive_blocks(twin, _samples(session, topics, window, joints)):
+                pass
+            lags |= {stream: Lag(clock.lag, clock.lag_sigma) for stream, clock in twin.clocks.items()}
+    return Commissioning(found, document, lags, absent, reads, told)
 
 
 def _document(session: Path, mapping: Path | None) -> dict[str, Any]:
@@ -231,11 +241,9 @@ def _values(message: Any, stream: Stream) -> list[tuple[str, float]]:
 
 def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, found: Checked) -> dict[Stream, Lag]:
     """Return the lags of the streams against what the strokes make a twin expect."""
-    wanted = [name for name in topics.heard if (topic := session.find(name)) is not None and topic.count]
     raw: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
     left: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
-    items = SessionSamples(session, topics, wanted, len(twin.mounts), window)
-    for step in drive_blocks(twin, (item for item in items if not isinstance(item, Change))):
+    for step in drive_blocks(twin, _samples(session, topics, window, len(twin.mounts))):
         if step is not None:
             _collect(raw, step[0])
             for each in step[1]:
@@ -243,6 +251,12 @@ def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, foun
                     _collect(left, each.residuals)
     known = {v.stream for v in found.verdicts} - {v.stream for v in found.verdicts if v.is_wrong and not v.is_sure}
     return {each: _lag(raw[each], left[each]) for each in Stream if each in known and each is not Stream.STROKES and left[each]}
+
+
+def _samples(session: Session, topics: Topics, window: TimeWindow, joints: int) -> Iterator[Any]:
+    """Yield the samples of a session, without changes that a node made."""
+    wanted = [name for name in topics.heard if (topic := session.find(name)) is not None and topic.count]
+    return (item for item in SessionSamples(session, topics, wanted, joints, window) if not isinstance(item, Change))
 
 
 def _collect(columns: dict[Stream, list[tuple[Array, Array]]], block: SampleBlock | Any) -> None:

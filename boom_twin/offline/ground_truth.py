@@ -20,30 +20,19 @@ from ..twin.blocks import EstimateBlock, PredictionBlock
 from ..types import NANO, Array
 
 FILE_NAME = "truth.csv.gz"
-LARGEST_TRUTH = 64 * 2**20
-"""Bytes of an unpacked file that are read: about an hour at 200 Hz."""
+LARGEST_TRUTH = 64 * 2**20  # bytes of an unpacked file that are read: about an hour at 200 Hz
 COLUMNS = ("t_s", "tip_x_m", "tip_y_m", "tip_ax_m_s2", "tip_ay_m_s2")
 LOAD_COLUMNS = ("tip_load_x_N", "tip_load_y_N")
 
 
 @dataclass(frozen=True)
 class TipTruth:
-    """True motion of the tip at the stroke stamps of a session, m of them.
+    """True motion of the tip at the stroke stamps of a session, m of them."""
 
-    Attributes
-    ----------
-    times : ndarray, shape (m,)
-        s after the start of the session.
-    position, acceleration : ndarray, shape (m, 2)
-        m, m/s^2; x forward, y up.
-    load : ndarray, shape (m, 2)
-        External force at the tip, N; 0 where the file has none.
-    """
-
-    times: Array
-    position: Array
+    times: Array  # s after the start of the session; shape (m,)
+    position: Array  # position, acceleration: m, m/s^2; x forward, y up; shape (m, 2)
     acceleration: Array
-    load: Array
+    load: Array  # external force at the tip, N; 0 where the file has none; shape (m, 2)
 
     def since(self, offset: float) -> TipTruth:
         """Return the truth from `offset` (s) after its beginning on."""

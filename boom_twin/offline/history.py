@@ -50,31 +50,22 @@ def _natural(history: History, scene: Scene) -> Array:
     return np.array([(min(column), max(column)) for column in columns]).reshape(-1, 2)
 
 
-POSTURES = 9
-"""Postures of a session whose natural frequencies are computed."""
-MOST_ROWS = 2**15
-"""Rows of predictions, and of each stream's residuals, beyond which they are thinned out: 2.7 min at 200 Hz."""
-MOST_SHAPES = 1024
-"""Shapes of the boom that are kept, of which pictures show two dozen."""
+POSTURES = 9  # postures of a session whose natural frequencies are computed
+MOST_ROWS = 2**15  # rows of predictions, and of each stream's residuals, beyond which they are thinned out: 2.7 min at 200 Hz
+MOST_SHAPES = 1024  # shapes of the boom that are kept, of which pictures show two dozen
 PREDICTED = (
     "stamps_s", "tip_displacement", "tip_position", "tip_acceleration", "joints", "cylinder_forces", "strokes", "moments",
     "slow_moments",
 )  # fmt: skip
 """Fields of a `History` with a row for every prediction."""
-ESTIMATED = tuple(f"estimated {each.name}" for each in fields(EstimateTrace))
-"""Columns of the estimates beside them."""
+ESTIMATED = tuple(f"estimated {each.name}" for each in fields(EstimateTrace))  # columns of the estimates beside them
 RESIDUALS = ("stamps", "values", "sigmas", "means")
 EXTREME = ("tip_displacement", "tip_position", "tip_acceleration", "moments", "slow_moments", *ESTIMATED[:3])
 """Columns whose extremes are kept."""
 
 
 class HistoryBuilder:
-    """Builder of a session's history from its stretches; its memory does not grow with their number.
-
-    Parameters
-    ----------
-    scene : Scene
-    """
+    """Builder of a session's history from its stretches; its memory does not grow with their number."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._plan = scene, compile_scene(scene)

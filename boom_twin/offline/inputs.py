@@ -11,7 +11,6 @@ from ..bag.reader import Session, read, scan
 from ..bag.session_model import (
     SessionScene,
     SessionStrokes,
-    given_scene,
     mapping_of,
     scene_of,
     settings_of,
@@ -52,36 +51,17 @@ USUAL = ReplayOptions()
 
 @dataclass(frozen=True)
 class ReplayInputs:
-    """Session and all that it is read with.
-
-    Attributes
-    ----------
-    session : Session
-    kept : SessionScene
-        Scene with its text and source.
-    settings : Settings
-    mapping : str
-        Source of the mapping.
-    topics : Topics
-    wanted : list of str
-        Input topics to read: that which drives the model, and those of other inputs with messages.
-    strokes : SessionStrokes
-    streams : tuple of Stream
-        Of the sensors that the mapping has; gyros only if the session's messages hold their readings.
-    health : bool
-        True if the rig's health is judged.
-    window : TimeWindow
-    """
+    """Session and all that it is read with."""
 
     session: Session
-    kept: SessionScene
+    kept: SessionScene  # scene with its text and source
     settings: Settings
-    mapping: str
+    mapping: str  # source of the mapping
     topics: Topics
-    wanted: list[str]
+    wanted: list[str]  # input topics to read: that which drives the model, and those of other inputs with messages
     strokes: SessionStrokes
-    streams: tuple[Stream, ...]
-    health: bool
+    streams: tuple[Stream, ...]  # of the sensors that the mapping has; gyros only if the session's messages hold their readings
+    health: bool  # True if the rig's health is judged
     window: TimeWindow
 
     @property
@@ -114,7 +94,8 @@ class ReplayInputs:
         """Return a twin for the session, which names causes of faults if that is asked for."""
         topics, reads = self.topics, self.strokes.reading
         mounts, settings = topics.mounts(len(self.scene.joints)), topics.noise_of(self.settings)
-        return Twin(self.scene, settings, mounts, self.health, reads, topics.absent, causes=causes, places=topics.places)
+        given = self.scene, settings, mounts, self.health, reads, topics.absent
+        return Twin(*given, causes=causes, places=topics.places, lagging=topics.lagging)
 
     def refuse(self, reason: str) -> None:
         """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""
@@ -131,7 +112,7 @@ def replay_inputs(
 ) -> ReplayInputs:
     """Return the inputs of a replay; for the parameters and errors see `boom_twin.offline.replay.replay`."""
     session, settings = scan(bag), settings or settings_of(bag).settings
-    kept = scene_for(session.path, scene)
+    kept = scene_of(session.path, scene)
     joints = kept.scene.joints
     mapped = mapping_of(session.path, Path(options.mapping) if options.mapping else None, len(joints), options.namespace)
     topics = mapped.topics.of_scene(joints)
@@ -161,8 +142,3 @@ def _has_rates(session: Session, topic: InputTopic, wanted: list[str]) -> bool:
         return False
     first = next(iter(read(session, {topic.absolute: topic.type})), None)
     return first is not None and first[2].angular_velocity_covariance[0] != NO_MEASUREMENT
-
-
-def scene_for(session: Path, scene: SceneSource | SessionScene) -> SessionScene:
-    """Return the scene to read a session with: `scene`, or if None that of `boom_twin.bag.session_model.scene_of`."""
-    return scene_of(session) if scene is None else given_scene(scene)

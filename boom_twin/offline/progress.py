@@ -29,8 +29,6 @@ class TenthLines:
         Number of units in the whole run.
     unit, name : str
         Plural name of the units, and name of the command.
-    done : int
-        Units done before the run.
     """
 
     def __init__(self, total: int, unit: str, name: str, done: int = 0) -> None:

@@ -16,25 +16,16 @@ from ..twin.blocks import CODES, EstimateBlock, PredictionBlock, ReportBlock, Sa
 from ..types import HELD, NANO, USUAL_STREAMS, Alarm, Array, Health, Report, Stream, StrokeReading, channels_of
 from .ground_truth import TipErrors
 
-STRETCH = 2**14
-"""Predictions in a stretch, at least: 82 s at 200 Hz, some 30 MB."""
+STRETCH = 2**14  # predictions in a stretch, at least: 82 s at 200 Hz, some 30 MB
 
 
 class ResidualRows(NamedTuple):
-    """Residuals of one stream.
+    """Residuals of one stream."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of its channels.
-    stamps : ndarray of int64, shape (k,)
-        Nanoseconds.
-    values, sigmas : ndarray, shape (k, channels)
-        Measured minus predicted in the unit of the sensor, NaN where not measured; standard deviation expected of it.
-    """
-
-    names: tuple[str, ...]
-    stamps: NDArray[np.int64]
+    names: tuple[str, ...]  # of its channels
+    stamps: NDArray[np.int64]  # ns; shape (k,)
+    # values, sigmas: measured minus predicted in the unit of the sensor, NaN where not measured; standard deviation expected of
+    # it; shape (k, channels)
     values: Array
     sigmas: Array
 
@@ -46,31 +37,15 @@ class ResidualRows(NamedTuple):
 
 @dataclass(frozen=True)
 class Stretch:
-    """Part of a session: everything that was predicted in it.
+    """Part of a session: everything that was predicted in it."""
 
-    Attributes
-    ----------
-    joints : int
-        Of the boom.
-    block : ReportBlock
-    health : list of Health
-    first : int
-        Stamp of the first prediction of the session, ns.
-    samples : list of SampleBlock
-        That were read meanwhile.
-    reads : StrokeReading
-        Of the strokes of the predictions.
-    streams : collection of Stream
-        Of the session's sensors.
-    """
-
-    joints: int
+    joints: int  # of the boom
     block: ReportBlock
     health: list[Health]
-    first: int
-    samples: list[SampleBlock]
-    reads: StrokeReading
-    streams: Collection[Stream]
+    first: int  # stamp of the first prediction of the session, ns
+    samples: list[SampleBlock]  # read meanwhile
+    reads: StrokeReading  # of the strokes of the predictions
+    streams: Collection[Stream]  # of the session's sensors
 
     @property
     def predictions(self) -> PredictionBlock:
@@ -94,26 +69,20 @@ class SessionTotals:
 
     Attributes
     ----------
-    samples : int
-        Predictions.
     acceleration : float
         The largest of the tip, m/s^2.
     residuals, normalised : ColumnStatistics
         Of the joints: rad, and over the expected deviations.
     tip_sigmas : ndarray, shape (2,)
         Largest standard deviation of the predicted tip's x and y, m; NaN if nothing is known of it.
-    tip_sigma : float or None
-        The largest of both together, m.
-    load : TipLoadFinder
-        Of the load at the tip that the model does not know.
     """
 
     def __init__(self, joints: int) -> None:
         self.samples, self.acceleration = 0, 0.0
         self.residuals, self.normalised = ColumnStatistics(joints), ColumnStatistics(joints)
         self.tip_sigmas: Array = np.full(2, np.nan)
-        self.tip_sigma: float | None = None
-        self.load = TipLoadFinder()
+        self.tip_sigma: float | None = None  # the largest of both together, m
+        self.load = TipLoadFinder()  # of the load at the tip that the model does not know
 
     def add(self, stretch: Stretch) -> None:
         """Add a stretch."""
@@ -139,29 +108,15 @@ class Recording:
 
     Parameters
     ----------
-    joints : int
-        Of the boom.
     take : callable, optional
         Is given every `Stretch` of the session, which is then let go; without it, the whole session is one, and kept.
     errors : TipErrors, optional
         Told of all predictions for which the truth is known.
-    reads : StrokeReading
-        Of the twin's strokes.
-    streams : collection of Stream
-        Of the session's sensors.
 
     Attributes
     ----------
     gaps, clock_sets : list of (int, int)
         Stamps (ns) between which strokes paused; stamps before and after a clock was set.
-    refused : int
-        Samples that were not used.
-    is_judged : bool
-        Whether the rig's health was.
-    noise : dict
-        See `Health.noise`; the newest.
-    totals : SessionTotals
-        Of all stretches that are complete.
     """
 
     def __init__(
@@ -185,10 +140,10 @@ class Recording:
         self._whole: Stretch | None = None
         self.gaps: list[tuple[int, int]] = []
         self.clock_sets: list[tuple[int, int]] = []
-        self.refused = 0
-        self.is_judged = False
-        self.noise: Mapping[str, float] = {}
-        self.totals = SessionTotals(joints)
+        self.refused = 0  # samples that were not used
+        self.is_judged = False  # whether the rig's health was
+        self.noise: Mapping[str, float] = {}  # see `Health.noise`; the newest
+        self.totals = SessionTotals(joints)  # of all stretches that are complete
 
     def add(self, found: ReportBlock | Report) -> None:
         """Add reports of samples."""
@@ -289,25 +244,6 @@ class Recording:
         if self._take is not None or found is None:
             raise ValueError("the stretches of this recording were given away")
         return found
-
-    @property
-    def predictions(self) -> PredictionBlock:
-        """All predictions, see `whole`."""
-        return self.whole.predictions
-
-    @property
-    def estimates(self) -> EstimateBlock:
-        """Estimates beside the predictions, see `whole`."""
-        return self.whole.estimates
-
-    @property
-    def health(self) -> list[Health]:
-        """Reports of the rig's health, see `whole`."""
-        return self.whole.health
-
-    def of(self, stream: Stream) -> ResidualRows:
-        """Return the residuals of one stream, see `whole`."""
-        return self.whole.of(stream)
 
     @property
     def duration(self) -> float:

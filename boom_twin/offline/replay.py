@@ -15,38 +15,37 @@ import numpy as np
 
 from .. import __version__
 from ..bag.reader import Session
-from ..bag.session_model import SessionScene, given_scene
+from ..bag.session_model import SessionScene, scene_from
 from ..bag.session_sheet import SessionSheet
 from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
 from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
+from ..health.sensor_check import sensor_ranges
 from ..loggers.column_file import ColumnFile
 from ..loggers.import_session import import_session
 from ..loggers.log_table import table_of_frame
 from ..messages.sample_decoder import ODDITIES
 from ..scene.load import SceneSource
 from ..system.atomic_files import write_atomic
-from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
+from ..system.result_folder import REPLAY, result_folder
 from ..system.summary_display import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..twin.events import CONSEQUENCES, EVENTS
 from ..twin.twin import Twin
-from ..types import Array, Change, Report, Stream, StrokeReading
+from ..types import SENSORS, Array, Change, Report, Stream, StrokeReading
 from .ground_truth import TipErrors, TipTruth, truth_in
-from .inputs import USUAL, ReplayOptions, replay_inputs
+from .inputs import USUAL, ReplayInputs, ReplayOptions, replay_inputs
 from .progress import Progress
 from .recording import Recording, Stretch
-from .refused_strokes import RefusedStrokes
-from .sample_table import RowsInMemory, SampleTable, columns_of
+from .sample_table import SampleTable, columns_of
 from .session_samples import SessionSamples
-from .summary import alarm_as_text, summary_of
+from .summary import alarm_as_text, clocks_of, summary_of
 from .threads import quick_switches, read_ahead, result_bag
 
-SESSION = "session"
-"""Folder in a replay of a table, with the session that was made of it."""
+SESSION = "session"  # folder in a replay of a table, with the session that was made of it
 
 
 @dataclass(frozen=True, repr=False)
@@ -83,11 +82,11 @@ class Replay(SummaryDisplay):
         ValueError
             The stretches were given away, see `replay_into`.
         """
-        stretch, rows = self.recording.whole, RowsInMemory()
-        table = SampleTable(lambda _: rows, stretch.joints, stretch.streams)
+        stretch, rows = self.recording.whole, list[Array]()
+        table = SampleTable(rows.append, stretch.joints, stretch.streams)
         table.add(stretch)
         table.finish()
-        return dict(zip(columns_of(stretch.joints, stretch.streams), np.concatenate(rows.parts).T, strict=True))
+        return dict(zip(columns_of(stretch.joints, stretch.streams), np.concatenate(rows).T, strict=True))
 
     def to_frame(self) -> Any:
         """Return `columns` as a ``pandas.DataFrame``; UsageError if pandas is not installed."""
@@ -173,7 +172,8 @@ def replay(
         options = ReplayOptions(progress, mapping, changes, health, window, namespace, with_bag, causes)
         if is_path:
             return replay_into(building, bag, scene, settings, options)
-        kept, place = given_scene(scene), building.inner(SESSION).folder
+        kept, place = scene_from(scene), building / SESSION
+        place.mkdir()
         sheet, own = SessionSheet(__version__, kept.text), None if mapping is None else Path(mapping)
         import_session([table_of_frame(bag)], place, ColumnFile(), sheet, len(kept.scene.joints), own)
         found = replay_into(building, place, kept, settings, options)
@@ -181,24 +181,24 @@ def replay(
 
 
 def replay_into(
-    building: UnfinishedResult,
+    out: Path,
     bag: str | Path,
     scene: SceneSource | SessionScene,
     settings: Settings | None = None,
     options: ReplayOptions = USUAL,
     take: Callable[[Stretch], None] | None = None,
 ) -> Replay:
-    """Replay as `replay` does, into a folder under construction to which more will be added.
+    """Replay as `replay` does, into the folder `out` under construction, to which more will be added.
 
     With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
     """
-    given, out = replay_inputs(Path(bag), scene, settings, options), building.folder
+    given = replay_inputs(Path(bag), scene, settings, options)
     session, joints = given.session, len(given.scene.joints)
     truth = truth_in(options.window, session, given.topics, given.wanted)
     errors = None if truth is None else TipErrors(truth)
     taking = None if take is None else _Timed(take)
     recording = Recording(joints, taking, errors, given.strokes.reading, given.streams)
-    other_boom, refused = OtherBoom(), RefusedStrokes(given.scene, given.kept.source, given.strokes.reading)
+    other_boom = OtherBoom()
     samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
     with ExitStack() as stack:
         twin, put = given.twin(options.causes), None
@@ -224,8 +224,6 @@ def replay_into(
                     other_boom.hear(health)
             if put is not None:
                 put(found)
-            if recording.is_empty:
-                refused.take(block)
             if not other_boom.is_judged:
                 given.refuse(other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
         given.refuse(other_boom.judge())
@@ -238,9 +236,9 @@ def replay_into(
         one, names, bounds = "angle", "joint", "the joints' range_deg"
     if recording.is_empty:
         raise BagError(
-            f"{session.path}: no {one} sample could be used ({_told(twin)}){refused.never_read}. "
+            f"{session.path}: no {one} sample could be used ({_told(twin)}). "
             f"It needs names {names}_1..{joints}, or those of a mapping, values within {bounds}, "
-            f"and stamps.{_explained(twin.counts)}{refused.told}"
+            f"and stamps.{_explained(twin.counts)}{_first_refused(given)} {_wiring(given, options)}"
         )
     recording.close()
     if recording.totals.samples == 1 < recording.refused:
@@ -251,7 +249,7 @@ def replay_into(
     if options.with_bag:
         SessionSheet(__version__, given.kept.text, strokes=given.strokes.reading).write(out / "bag")
     file = out / "bag" / FILE_NAME if options.with_bag else None
-    summary = summary_of(recording, twin.counts, wall, file) | given.summary
+    summary = summary_of(recording, twin.counts, wall, file) | clocks_of(twin.clocks) | given.summary
     if errors is not None:
         summary |= errors.rms
     write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
@@ -281,6 +279,29 @@ def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) 
         else:
             residuals += list(each.residuals.values[each.residuals.streams == code, :joints])
     return block.values[block.streams == code, :joints], residuals
+
+
+def _first_refused(given: ReplayInputs) -> str:
+    """Return a sentence on the first stroke, or angle that drives the model, outside its sensor's range; empty without one."""
+    stream, joints = given.strokes.reading.stream, len(given.scene.joints)
+    low, high = sensor_ranges(given.scene, given.topics.mounts(joints))[stream]
+    for item in SessionSamples(given.session, given.topics, given.wanted, joints, given.window):
+        if isinstance(item, SampleBlock):
+            values = item.values[item.streams == CODES[stream], :joints]
+            for row, i in np.argwhere((values < low) | (values > high)):
+                name, unit = SENSORS[stream].channels(joints)[i], SENSORS[stream].unit
+                value = f"{name} = {values[row, i]:.6g} {unit}"
+                return f" The first refused value: {value}, its sensor can read {low[i]:.4g} to {high[i]:.4g} {unit}."
+    return ""
+
+
+def _wiring(given: ReplayInputs, options: ReplayOptions) -> str:
+    """Return a sentence on how the strokes of a session are wired, or the remedy for angles."""
+    if given.strokes.reading is StrokeReading.ANGLE:
+        return "Give names, units and zeros of the joints' sensors by --mapping."
+    from .commissioning import wiring_of  # only a session without any usable stroke needs it
+
+    return f"Wiring: {wiring_of(given.session.path, given.kept, options.mapping, given.window)}."
 
 
 def _explained(counts: Counter[str]) -> str:

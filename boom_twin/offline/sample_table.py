@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import IO, Any, Protocol
+from typing import IO, Any
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from ..twin.blocks import CODES, Integers, SampleBlock
 from ..types import NANO, SENSORS, USUAL_STREAMS, Array, Stream, channels_of
 from .recording import Stretch
 
-DELAY = 2.0
-"""Time (s) that a row waits for late residuals."""
+DELAY = 2.0  # time (s) that a row waits for late residuals
 ESTIMATED = (
     "tip_x_m", "tip_y_m", "tip_angle_rad", "tip_vx_m_s", "tip_vy_m_s", "tip_angular_velocity_rad_s",
     "tip_ax_m_s2", "tip_ay_m_s2", "tip_angular_acceleration_rad_s2", "load_x_N", "load_y_N",
@@ -63,16 +62,6 @@ def _channel_columns(joints: int, streams: Collection[Stream], kind: str) -> dic
     }
 
 
-class TableFile(Protocol):
-    """Interface of a file that table rows are written to."""
-
-    def write(self, rows: Array) -> None:
-        """Append rows, shape (k, columns)."""
-
-    def close(self) -> None:
-        """Complete the table."""
-
-
 class CsvFile:
     """CSV file with a head; numbers with nine significant digits, times with nine decimals, nothing for NaN."""
 
@@ -82,31 +71,12 @@ class CsvFile:
         self._form = ",".join(["%.9f", *["%.9g"] * (len(columns) - 1)]) + "\n"
 
     def write(self, rows: Array) -> None:
-        """See `TableFile`."""
+        """Append rows, shape (k, columns)."""
         self._file.write("".join(self._form % tuple(row) for row in rows.tolist()).replace("nan", ""))
 
     def close(self) -> None:
-        """See `TableFile`."""
+        """Complete the table."""
         self._file.close()
-
-
-class RowsInMemory:
-    """Table in memory.
-
-    Attributes
-    ----------
-    parts : list of ndarray, shape (k, columns)
-    """
-
-    def __init__(self) -> None:
-        self.parts: list[Array] = []
-
-    def write(self, rows: Array) -> None:
-        """See `TableFile`."""
-        self.parts.append(rows)
-
-    def close(self) -> None:
-        """See `TableFile`."""
 
 
 class ParquetFile:
@@ -118,12 +88,12 @@ class ParquetFile:
         self._writer = parquet.ParquetWriter(path, self._schema)
 
     def write(self, rows: Array) -> None:
-        """See `TableFile`."""
+        """Append rows, shape (k, columns)."""
         arrays = [self._arrow.array(np.ascontiguousarray(column), from_pandas=True) for column in rows.T]
         self._writer.write_table(self._arrow.Table.from_arrays(arrays, schema=self._schema))
 
     def close(self) -> None:
-        """See `TableFile`."""
+        """Complete the table."""
         self._writer.close()
 
 
@@ -143,7 +113,7 @@ def check_kind(kind: str | None) -> None:
         _arrow()
 
 
-def table_file(path: Path, columns: Sequence[str]) -> TableFile:
+def table_file(path: Path, columns: Sequence[str]) -> CsvFile | ParquetFile:
     """Return the file of a table with these columns, by the end of its name ``.csv`` or ``.parquet``.
 
     Raises
@@ -155,23 +125,14 @@ def table_file(path: Path, columns: Sequence[str]) -> TableFile:
 
 
 class SampleTable:
-    """Builder of a replay's table; `boom_twin.offline.replay.replay_into` gives stretches to its `add`.
+    """Builder of a replay's table, with the columns of `columns_of`; rows, shape (k, columns), go to `put`.
 
-    Parameters
-    ----------
-    open_file : callable
-        Is given the names of the columns, and returns the file that the rows go to.
-    joints : int
-        Of the boom.
-    streams : collection of Stream
-        Of its sensors.
+    `boom_twin.offline.replay.replay_into` gives stretches to its `add`.
     """
 
-    def __init__(
-        self, open_file: Callable[[Sequence[str]], TableFile], joints: int, streams: Collection[Stream] = USUAL_STREAMS
-    ) -> None:
+    def __init__(self, put: Callable[[Array], object], joints: int, streams: Collection[Stream] = USUAL_STREAMS) -> None:
         columns = columns_of(joints, streams)
-        self._file = open_file(columns)
+        self._put = put
         self._measured, self._residuals = (
             {CODES[stream]: columns.index(names[0]) for stream, names in found.items() if names}
             for found in (_channel_columns(joints, streams, kind) for kind in ("measured", "residual"))
@@ -198,9 +159,8 @@ class SampleTable:
         self._write(int(np.searchsorted(self._stamps, self._stamps[-1] - round(DELAY / NANO))))
 
     def finish(self) -> None:
-        """Write the rest, and complete the file."""
+        """Write the rest."""
         self._write(len(self._stamps))
-        self._file.close()
 
     def _new_rows(self, stretch: Stretch) -> Array:
         """Return rows with the predicted and estimated values; the rest is NaN."""
@@ -231,6 +191,6 @@ class SampleTable:
     def _write(self, count: int) -> None:
         """Write the first of the waiting rows."""
         if count:
-            self._file.write(self._rows[:count])
+            self._put(self._rows[:count])
             self._before = int(self._stamps[count - 1])
             self._stamps, self._rows = self._stamps[count:], self._rows[count:]

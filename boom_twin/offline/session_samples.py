@@ -6,16 +6,20 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from itertools import repeat
 
+import numpy as np
+
 from ..bag.reader import Session, read, read_blocks
+from ..bag.session_blocks import SessionBlocks
 from ..bag.session_file import PARSE_ERRORS
 from ..bag.time_window import WHOLE, TimeWindow
-from ..messages.cdr_decoder import CdrDecoder
+from ..messages.cdr_decoder import CdrDecoder, stamp_in
+from ..messages.message_block import MessageBlock
 from ..messages.report_encoder import decode_changes
 from ..messages.sample_decoder import SampleDecoder
 from ..messages.topic_table import TYPES, Output, Topics
 from ..messages.type_store import decode
-from ..twin.blocks import SampleBlock, block_of, samples_in
-from ..types import SENSORS, Change, Sample
+from ..twin.blocks import CODES, Integers, SampleBlock, block_of, samples_in
+from ..types import SENSORS, Array, Change, Sample, Stream
 
 CHANGE_SPAN = 2_000_000_000
 """Nanoseconds, of log time and of stamps, within which a change and its stroke sample are looked for.
@@ -72,8 +76,7 @@ def recorded_changes(session: Session, topics: Topics) -> Changes:
     return Changes((log, decode_changes(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
 
 
-BATCH = 400
-"""Messages in one block, at least."""
+BATCH = 400  # messages in one block, at least
 
 
 class SessionSamples:
@@ -81,26 +84,14 @@ class SessionSamples:
 
     Parameters
     ----------
-    session : Session
-    topics : Topics
-        How its topics and sensors are named, and read.
-    wanted : list of str
-        The input topics to be read.
-    joints : int
-        Of the scene.
     window : TimeWindow, optional
         The part of the session that is read.
-
-    Attributes
-    ----------
-    oddities : Counter
-        Of the decoder, up to now.
     """
 
     def __init__(self, session: Session, topics: Topics, wanted: list[str], joints: int, window: TimeWindow = WHOLE) -> None:
         self._session, self._topics, self._wanted, self._window = session, topics, wanted, window
         self._joints, self._decoder = joints, SampleDecoder(joints, topics)
-        self._waiting: list[Sample] = []
+        self._waiting: list[SampleBlock] = []
         self._refused = 0  # messages that were told
 
     @property
@@ -118,36 +109,68 @@ class SessionSamples:
         BagError
             The session cannot be read.
         """
-        heard, decoder, session = self._topics.heard, self._decoder, self._session
+        heard, session = self._topics.heard, self._session
         changes = recorded_changes(session, self._topics)
         types = {name: self._topics.inputs[heard[name][0]].type for name in self._wanted}
         blocks, count = read_blocks(session, types, self._window), 0
         streams, drive = [heard[source.name] for source in blocks.sources], self._topics.stroke_reading.stream
         wires = [CdrDecoder(TYPES[group[0]], decode, SENSORS[group[0]].field) for group in streams]
         for block in blocks:
-            for row, source in enumerate(block.sources.tolist()):
-                try:
-                    stamp, message = wires[source].read(block.data(row))
-                except PARSE_ERRORS:
-                    blocks.decoded(block, row)  # raises it with its place
-                    raise
-                if changes.are_left and drive in streams[source]:
-                    for change in changes.due(int(block.log_times[row]), stamp):
+            first = 0
+            while first < len(block):
+                part = block.chosen(slice(first, first + (1 if changes.are_left else BATCH)))
+                if changes.are_left and drive in streams[part.sources[0]]:
+                    for change in changes.due(int(part.log_times[0]), stamp_in(part.data(0)) or 0):
                         yield from self._batch()
                         yield change
-                self._waiting += decoder.samples(streams[source], stamp, message)
-                count += 1
+                self._take(blocks, part, wires, streams)
+                first, count = first + len(part), count + len(part)
                 if count >= BATCH:
                     count = 0
                     yield from self._batch()
-        self._waiting += decoder.assembler.rest()
+        self._keep([(0, each) for each in self._decoder.assembler.rest()], [])
         yield from self._batch()
+
+    def _take(self, blocks: SessionBlocks, part: MessageBlock, wires: list[CdrDecoder], streams: list[list[Stream]]) -> None:
+        """Decode messages: those of a source at once if all are regular, others one by one in their order."""
+        irregular, regular = list[Integers](), list[tuple[Integers, Stream, Integers, Array]]()
+        for source in np.unique(part.sources).tolist():
+            rows, found = np.flatnonzero(part.sources == source), None
+            if len(rows) > 1 and (read := wires[source].read_many(part.chosen(rows))) is not None:
+                found = self._decoder.many(streams[source], *read)
+            if found is None:
+                irregular.append(rows)
+            else:
+                regular += [(rows, *each) for each in found]
+        single = list[tuple[int, Sample]]()
+        for row in np.sort(np.concatenate(irregular)).tolist() if irregular else ():
+            source = int(part.sources[row])
+            try:
+                stamp, message = wires[source].read(part.data(row))
+            except PARSE_ERRORS:
+                blocks.decoded(part, row)  # raises it with its place
+                raise
+            single += [(row, each) for each in self._decoder.samples(streams[source], stamp, message)]
+        self._keep(single, regular)
+
+    def _keep(self, single: list[tuple[int, Sample]], regular: list[tuple[Integers, Stream, Integers, Array]]) -> None:
+        """Keep samples for the next block, in the order of their messages."""
+        rows = [np.array([row for row, _ in single], int)]
+        parts = [block_of([sample for _, sample in single], self._joints)]
+        for at, stream, stamps, own in regular:
+            values = np.full((len(at), parts[0].values.shape[1]), np.nan)
+            values[:, : own.shape[1]] = own
+            rows.append(at)
+            parts.append(SampleBlock(np.full(len(at), CODES[stream]), stamps, values))
+        order = np.argsort(np.concatenate(rows), kind="stable")
+        self._waiting.append(SampleBlock(*(np.concatenate(column)[order] for column in zip(*parts, strict=True))))
 
     def _batch(self) -> Iterator[SampleBlock | None]:
         """Yield the samples that wait, and None for each message that was refused since the last batch."""
-        if self._waiting:
-            yield block_of(self._waiting, self._joints)
-            self._waiting.clear()
+        waiting = [block for block in self._waiting if len(block.stamps)]
+        self._waiting.clear()
+        if waiting:
+            yield SampleBlock(*map(np.concatenate, zip(*waiting, strict=True)))
         refused, self._refused = self._decoder.refused - self._refused, self._decoder.refused
         yield from repeat(None, refused)
 

@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ..deviation.load_spectrum import TipLoad
 from ..health.alarms import evidence_with_cause
 from ..system.received_files import sha256_of
-from ..types import NANO, Alarm
+from ..types import NANO, Alarm, Clock, Stream
 from .recording import Recording
 
 
 def summary_of(recording: Recording, counts: Counter[str], wall: float, file: Path | None) -> dict[str, Any]:
-    """Return the numbers of a replay for ``summary.json``.
-
-    Parameters
-    ----------
-    recording : Recording
-    counts : Counter
-        Events of the twin.
-    wall : float
-        Time of reading, stepping and writing, s.
-    file : Path or None
-        Result bag, if there is one.
-    """
+    """Return the numbers of a replay for ``summary.json``."""
     totals, duration = recording.totals, recording.duration
     return {
         "samples": totals.samples,
@@ -43,6 +33,20 @@ def summary_of(recording: Recording, counts: Counter[str], wall: float, file: Pa
         **recording.noise,
         "output_sha256": None if file is None else sha256_of(file),
         "alarms": _alarms(recording, recording.first),
+    }
+
+
+def clocks_of(clocks: Mapping[Stream, Clock]) -> dict[str, Any]:
+    """Return the lags and drifts that were estimated, as at the end; empty without any."""
+    if not clocks:
+        return {}
+    found = list(clocks.values())
+    return {
+        "lag_streams": [stream.value for stream in clocks],
+        "lags_s": [clock.lag for clock in found],
+        "lag_sigmas_s": [clock.lag_sigma for clock in found],
+        "clock_drifts_ppm": [1e6 * clock.drift for clock in found],
+        "clock_drift_sigmas_ppm": [1e6 * clock.drift_sigma for clock in found],
     }
 
 

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
-from ..bag.writer import RESULT_CHUNK_SIZE, SessionWriter
+from ..bag.writer import RESULT_CHUNK_SIZE, MessageWriter
 from ..config.settings import Settings
 from ..messages.report_encoder import ReportEncoder
 from ..messages.topic_table import Output, Topic, Topics
@@ -22,8 +22,7 @@ from ..scene.schema import Scene
 from ..twin.blocks import ReportBlock
 from ..types import Report
 
-ITEMS_AHEAD = 8
-"""Blocks of samples, or of reports, that wait between two threads."""
+ITEMS_AHEAD = 8  # blocks of samples, or of reports, that wait between two threads
 SWITCH_INTERVAL = 2e-5
 """Time (s) that a thread keeps the interpreter's lock while another waits; a call of the twin's kernel takes 1 ms."""
 Item = TypeVar("Item")
@@ -61,19 +60,6 @@ def result_bag(
 
     The bag is complete if the block ends without an exception.
 
-    Parameters
-    ----------
-    directory : Path
-        New or empty.
-    notes : mapping of str to str
-        Kept in the bag.
-    topics : Topics
-        Names of the output topics and of their frame.
-    scene : Scene
-        Scene of the twin.
-    settings : Settings
-        Settings of the drawing.
-
     Raises
     ------
     BagError
@@ -81,7 +67,7 @@ def result_bag(
     """
     encoder = ReportEncoder(scene, settings, topics.frame)
     outputs: dict[str, Topic] = {key: topic for key, topic in topics.outputs.items() if key is not Output.DIAGNOSTICS}
-    with SessionWriter(directory, outputs, notes, chunk_size=RESULT_CHUNK_SIZE) as bag:
+    with MessageWriter(directory, outputs, notes, chunk_size=RESULT_CHUNK_SIZE) as bag:
         thread, waiting = ThreadPoolExecutor(1, "write"), deque[Future[None]]()
 
         def write(found: list[ReportBlock | Report]) -> None:

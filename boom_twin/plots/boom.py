@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..scene.kinematics import JointPins, Skeleton
-from ..scene.schema import Scene, section_depth
+from ..scene.schema import Scene
 from ..types import Array
-from .style import BLUE, GREEN, GREY, INK, PURPLE
+from .style import BLUE, GREY, INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,26 +62,10 @@ def draw_section(axes: Axes, corners: list[tuple[Array, Array, bool]], depth: fl
 
 
 def _box(axes: Axes, start: Array, stop: Array, width: float, colour: str, order: float, alpha: float = 1.0) -> None:
-    """Draw a rectangle about the line from start to stop."""
     along = (stop - start) / np.hypot(*(stop - start))
     across = 0.5 * width * np.array([-along[1], along[0]])
     x, y = np.array([start + across, stop + across, stop - across, start - across]).T
     axes.fill(x, y, facecolor=colour, edgecolor=GREY, linewidth=0.9, zorder=order, alpha=alpha)
-
-
-def draw_boom(axes: Axes, scene: Scene, bones: Skeleton, alpha: float = 0.55) -> None:
-    """Draw base, sections, cylinders, links and pins of an undeformed boom."""
-    size = 0.035 * float(sum(section.length for section in scene.sections))
-    for i in range(len(scene.sections)):
-        draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i), alpha)
-    for joint, part in zip(bones.joints, scene.joints, strict=True):
-        draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, part.cylinder.closed_length, 0.22 * size)
-        for corners, colour in zip(joint.links, (GREEN, PURPLE), strict=False):
-            draw_link(axes, corners, colour, 3.0)
-        for pin in named_pins(joint).values():
-            draw_pin(axes, pin, 4.0)
-    draw_base(axes, bones.pivots[0], size)
-    draw_base(axes, bones.joints[0].barrel_pin, 0.5 * size)
 
 
 def named_pins(joint: JointPins) -> dict[str, Array]:

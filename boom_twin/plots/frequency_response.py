@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 
 
 def response_picture(path: Path, title: str, unit: str, response: FrequencyResponse, natural: Array) -> None:
-    """Draw amplitudes of tip, joint angles and cylinder forces over frequency; `unit` is that of the load.
-
-    natural : (modes,) natural frequencies, Hz, drawn as lines.
-    """
+    """Draw amplitudes of tip, joint angles and cylinder forces over frequency, with lines at the `natural` frequencies, Hz."""
     per = f"per {unit}"
     panels: list[tuple[str, ComplexArray, list[str]]] = [
         (f"tip, m {per}", response.tip, ["x", "y"]),

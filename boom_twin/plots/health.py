@@ -23,7 +23,6 @@ def timeline_picture(path: Path, session: str, end: float, alarms: list[AlarmSpa
 
 
 def _bars(axes: Axes, alarms: list[AlarmSpan], end: float) -> None:
-    """Draw one bar for each alarm, the first on top."""
     axes.grid(axis="y", visible=False)
     axes.set_ylim(max(len(alarms), 1) - 0.4, -0.6)
     axes.set_yticks(range(len(alarms)), [alarm.channel for alarm in alarms])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..scene.kinematics import Skeleton, skeleton, stroke_curve
-from ..scene.schema import Scene, section_depth
+from ..scene.schema import Scene
 from ..types import Array
 from .boom import draw_cylinder, draw_link, draw_pin, draw_section, named_pins, section_parts
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, picture, side_view
@@ -27,10 +27,7 @@ ENDS = ((BLUE, "lowest"), (ORANGE, "highest"))
 
 
 def joint_ranges_picture(path: Path, scene: Scene, name: str) -> Path:
-    """Draw one pair of panels for each joint, and one panel of the boom with every joint at the ends of its range.
-
-    `name` is that of the scene in the title. Returns `path`.
-    """
+    """Draw a pair of panels for each joint, and one of the boom with every joint at the ends of its range; return `path`."""
     count = len(scene.joints)
     columns = min(COLUMNS, count + 1)
     rows = -(-(count + 1) // columns)
@@ -58,7 +55,7 @@ def _boom(axes: Axes, scene: Scene) -> None:
     with np.errstate(invalid="ignore"):
         bones = skeleton(scene, angles)
     for i in range(len(scene.sections)):
-        draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i))
+        draw_section(axes, section_parts(scene, bones, i), scene.sections[i].depth)
     for i, joint in enumerate(scene.joints):
         before = float(bones.headings[i] - angles[i])
         _fan(axes, bones.pivots[i], before + np.radians(joint.range_deg), FAN * scene.sections[i].length)
@@ -90,7 +87,6 @@ def folded_section(pivot: Array, before: float, angle: float, length: float, asi
 
 
 def _fan(axes: Axes, pivot: Array, ends: Array, radius: float) -> None:
-    """Draw the sector that a section sweeps about its pivot."""
     turn = np.linspace(ends[0], ends[1], 60)
     rim = pivot + radius * np.column_stack([np.cos(turn), np.sin(turn)])
     axes.fill(*np.vstack([pivot, rim]).T, facecolor=PURPLE, alpha=0.18, linewidth=0, zorder=3)
@@ -119,16 +115,13 @@ def _joint(axes: Axes, scene: Scene, i: int) -> None:
 
 
 def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | None) -> None:
-    """Draw one position of a joint's mechanism; name its pins if `colour` is given.
-
-    The names have a bright outline, because links and cylinders lie below them.
-    """
+    """Draw one position of a joint's mechanism; name its pins, with a bright outline, if `colour` is given."""
     from matplotlib.patheffects import withStroke
 
     joint, alpha = bones.joints[i], 0.12 if colour is None else 0.4
-    draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i), alpha)
+    draw_section(axes, section_parts(scene, bones, i), scene.sections[i].depth, alpha)
     if i > 0:
-        draw_section(axes, section_parts(scene, bones, i - 1), section_depth(scene, i - 1), 0.12)
+        draw_section(axes, section_parts(scene, bones, i - 1), scene.sections[i - 1].depth, 0.12)
     for corners, own in zip(joint.links, (GREEN, PURPLE), strict=False):
         draw_link(axes, corners, PALE if colour is None else own, 2.0 if colour is None else 3.5)
     if colour is None:
@@ -145,7 +138,6 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
 
 
 def _stroke(axes: Axes, scene: Scene, i: int) -> None:
-    """Draw stroke by angle in the band that the cylinder has."""
     joint = scene.joints[i]
     degrees = np.linspace(*joint.range_deg, CURVE)
     axes.axhspan(0.0, joint.cylinder.max_stroke, color=PALE, alpha=0.5, linewidth=0, label="0 to max_stroke")

@@ -41,7 +41,6 @@ def posture_picture(path: Path, session: str, history: History, note: str) -> No
 
 
 def _name_section(axes: Axes, line: Array, middle: int, number: int) -> None:
-    """Write the name of a section beside its middle point on a line (m), with a bright outline."""
     from matplotlib.patheffects import withStroke
 
     (x, y), along = line[middle], line[min(middle + 1, len(line) - 1)] - line[max(middle - 1, 0)]

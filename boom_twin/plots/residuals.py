@@ -74,8 +74,8 @@ def _distribution(axes: Axes, found: ResidualDistribution) -> None:
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
     if found.mean is not None:
-        middles = 0.5 * (EDGES[:-1] + EDGES[1:])
-        axes.hist(middles, EDGES.tolist(), weights=found.counts, density=True, color=SKY, alpha=0.8, linewidth=0)
+        density = found.counts / (found.counts.sum() * np.diff(EDGES))
+        axes.stairs(density, EDGES, fill=True, color=SKY, alpha=0.8, linewidth=0)
         text = f"mean {found.mean:+.2f}\nsd {found.deviation:.2f}"
         axes.text(0.98, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=11, color=INK)
 
@@ -104,7 +104,6 @@ def spectrum_picture(path: Path, session: str, history: History, note: str) -> N
 
 
 def _modes(axes: Axes, natural: Array) -> None:
-    """Mark the natural frequencies (Hz), shape (modes, 2), each from its least to its largest; with their numbers."""
     for number, (low, high) in enumerate(natural, 1):
         axes.axvspan(low, max(high, 1.01 * low), color=PURPLE, alpha=0.25, linewidth=0, zorder=0.5)
         place = np.sqrt(low * high), 0.99

@@ -1,4 +1,4 @@
-"""Pictures of whole sessions: all of one replay, two compared, a calibration."""
+"""Pictures of whole sessions: all of one replay, two compared, a calibration, identified modes."""
 
 from __future__ import annotations
 
@@ -24,31 +24,26 @@ def replay_pictures(
     """Draw what was replayed into a directory, which is made if it is not there; return the written files.
 
     These are ``tip.png``, ``residuals.png`` (if there are channels), ``posture.png`` (if there are shapes), ``spectrum.png``
-    (from 4 s on); none at all if nothing was predicted. The same arrays give the same bytes. `session` is its name for the
-    titles, and `note` small print such as "synthetic session of a virtual rig".
+    (from 4 s on). `session` is its name for the titles, and `note` small print.
     """
     if len(history.stamps_s) == 0:
         return []
     directory.mkdir(parents=True, exist_ok=True)
     import_plotting()
     tip, residuals, posture, spectrum = (directory / f"{name}.png" for name in ("tip", "residuals", "posture", "spectrum"))
-    written = [tip]
+    is_drawn = {tip: True, residuals: history.residual_names, posture: history.shapes, spectrum: has_spectrum(history)}
 
-    def draw_residuals() -> None:
-        if history.residual_names:
+    def draw_half() -> None:
+        if is_drawn[residuals]:
             residual_picture(residuals, session, history, note)
-
-    with beside(draw_residuals):  # it takes as long as the others together
-        tip_picture(tip, session, history, truth, note)
-        if history.residual_names:
-            written.append(residuals)
-        if history.shapes:
-            written.append(posture)
+        if is_drawn[posture]:
             posture_picture(posture, session, history, note)
-        if has_spectrum(history):
-            written.append(spectrum)
+
+    with beside(draw_half):
+        tip_picture(tip, session, history, truth, note)
+        if is_drawn[spectrum]:
             spectrum_picture(spectrum, session, history, note)
-    return written
+    return [path for path, is_there in is_drawn.items() if is_there]
 
 
 SHOWN = 30.0  # standard deviations at which a bar is cut off, with its number beside it
@@ -158,3 +153,25 @@ def trends_picture(path: Path, title: str, trends: Sequence[Trend]) -> None:
             axes.set_title(f"{trend.label}: {trend.values[0]:.4g} in the first session, {trend.values[-1]:.4g} in the last")
             axes.ticklabel_format(axis="y", useOffset=False)
             axes.xaxis.set_tick_params(labelbottom=True)
+
+
+def stabilisation_picture(path: Path, title: str, poles: Array, modes: Array, model: Array) -> None:
+    """Draw poles, identified modes, and natural frequencies of the model (k,), Hz.
+
+    `poles` (p, 3): frequency (Hz), model order, and 1 if stable, else 0. `modes` (m, 2): frequencies and deviations, Hz.
+    """
+    with picture(path, title, "a pole is stable if it stays the same at the next model order") as figure:
+        axes = figure.subplots()
+        for is_stable, colour, size, label in ((0.0, GREY, 9, "pole"), (1.0, BLUE, 22, "stable pole")):
+            own = poles[poles[:, 2] == is_stable]
+            axes.scatter(own[:, 0], own[:, 1], s=size, color=colour, label=label, linewidths=0)
+        for number, (frequency, sigma) in enumerate(modes):
+            low, high = frequency - 2.0 * sigma, frequency + 2.0 * sigma
+            axes.axvspan(low, high, color=BLUE, alpha=0.2, linewidth=0, label="" if number else "mode, two deviations")
+        for number, frequency in enumerate(model):
+            axes.axvline(frequency, color=ORANGE, linestyle=":", label="" if number else "model")
+        axes.set_xlabel("frequency, Hz")
+        axes.set_ylabel("model order")
+        highest = max(np.max(poles[:, 0], initial=1.0), np.max(modes[:, 0], initial=1.0))
+        axes.set_xlim(0.0, 1.02 * float(highest))
+        legend_above(axes, 4)

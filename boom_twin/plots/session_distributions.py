@@ -12,8 +12,7 @@ from ..analysis.even_times import power_density, spacing, unbroken
 from ..types import Array
 from .history import Density, History, ResidualDistribution, SessionDistributions
 
-EDGES = np.linspace(-5.0, 5.0, 51)
-"""Edges of the bins of normalised residuals. Residuals outside count in the outermost bins."""
+EDGES = np.linspace(-5.0, 5.0, 51)  # edges of the bins of normalised residuals; residuals outside count in the outermost bins
 SEGMENT = 8.0  # s; lines of a spectrum are 1/SEGMENT apart
 
 

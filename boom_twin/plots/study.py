@@ -87,7 +87,6 @@ def _frame(axes: Axes, panel: Panel) -> None:
 
 
 def _notes(axes: Axes, curve: Curve) -> None:
-    """Draw small print beside those points of a curve that have any."""
     paper = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.6}
     colour = curve.look["color"]
     for note, x, y in zip(curve.notes, _ms(curve.seconds), curve.errors, strict=False):
@@ -96,7 +95,6 @@ def _notes(axes: Axes, curve: Curve) -> None:
 
 
 def _marks(axes: Axes, panel: Panel) -> None:
-    """Draw front, default and floor."""
     if panel.front:
         x, y = np.array(panel.front).T
         look = {"color": INK, "linewidth": 1.0, "linestyle": (0, (2, 2)), "markeredgecolor": INK, "zorder": 4, **RING}

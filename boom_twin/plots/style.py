@@ -96,11 +96,11 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
     write_atomic(path, content.getvalue())
 
 
-def _part_titles_and_legends(figure: Figure) -> None:
+def _part_titles_and_legends(figure: Any) -> None:
     """Raise every title that a legend would cover above that legend."""
     from matplotlib.text import Text
 
-    figure.draw_without_rendering()
+    figure.get_layout_engine().execute(figure)
     has_moved = False
     for axes in figure.axes:
         legend, text = axes.get_legend(), axes.get_title(loc="left")
@@ -115,9 +115,9 @@ def _part_titles_and_legends(figure: Figure) -> None:
 
 
 def shade_gaps(axes: Axes, gaps: list[tuple[float, float]]) -> None:
-    """Draw grey bands where strokes were missing. The first band has a legend label."""
+    """Draw grey bands where samples were missing. The first band has a legend label."""
     for number, (start, stop) in enumerate(gaps):
-        axes.axvspan(start, stop, color=PALE, linewidth=0, zorder=0.5, label="" if number else "strokes missing")
+        axes.axvspan(start, stop, color=PALE, linewidth=0, zorder=0.5, label="" if number else "no samples")
 
 
 def shade_alarms(axes: Axes, alarms: list[AlarmSpan]) -> None:

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
 ENLARGED_SPAN = 6.0  # s shown enlarged
 TRUTH: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (3, 4))}
-COLOURS = (BLUE, ORANGE)
-"""Of x and y. A prediction is a broad pale line, an estimate a thin dark one over it."""
+COLOURS = (BLUE, ORANGE)  # of x and y; a prediction is a broad pale line, an estimate a thin dark one over it
 BROAD: dict[str, Any] = {"linewidth": 3.2, "alpha": 0.4}
 BAND = 2.0  # standard deviations that are shaded, as their label says
 
@@ -126,7 +125,6 @@ def _rms(gap: Array) -> float:
 
 
 def _mark(axes: Axes, window: tuple[float, float]) -> None:
-    """Shade the part of the session that is shown enlarged."""
     axes.axvspan(*window, color=PALE, alpha=0.6, linewidth=0, zorder=0.4)
     late = sum(window) > sum(axes.get_xlim())
     place, shift, side = (window[0], -4, "right") if late else (window[1], 4, "left")

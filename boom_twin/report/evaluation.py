@@ -14,7 +14,6 @@ from ..offline.recording import Stretch
 from ..offline.replay import Replay, replay_into
 from ..plots import History
 from ..scene.schema import Scene
-from ..system.result_folder import UnfinishedResult
 from ..types import Array
 from .fatigue import Fatigue, FatigueCounter
 from .quantities import Load, QuantityBuilder, write
@@ -85,7 +84,7 @@ class Evaluator:
 
 
 def evaluated_replay(
-    building: UnfinishedResult,
+    building: Path,
     bag: str | Path,
     scene: SessionScene,
     settings: Settings,
@@ -105,4 +104,4 @@ def evaluated_replay(
         if also is not None:
             also(stretch)
 
-    return evaluator.finish(replay_into(building, bag, scene, settings, options, take), building.folder)
+    return evaluator.finish(replay_into(building, bag, scene, settings, options, take), building)

@@ -31,7 +31,6 @@ KNEE_CYCLES = 5e6
 CATEGORY_CYCLES = 2e6
 LIVES = (10, 20, 30)  # years of life for which the hours of work a year are given
 YEAR = 8760.0  # hours
-HUNDRED = 100.0  # hours, from which on no tenths are shown
 NOISE_RANGE = 1e5  # Pa; cycles below are noise, and do no damage in any category
 BIN = 1e4  # Pa, in which ranges are added up
 
@@ -74,7 +73,7 @@ def hours_to_end(damage: float, hours: float) -> float | None:
 
 def hours_as_text(hours: float | None) -> str:
     """Return hours to three digits, in groups of thousands; a dash for None."""
-    return "-" if hours is None else f"{float(f'{hours:.3g}'):,.{0 if hours >= HUNDRED else 1}f}".replace(",", " ")
+    return "-" if hours is None else f"{float(f'{hours:.3g}'):,.{0 if hours >= 100.0 else 1}f}".replace(",", " ")
 
 
 def yearly_as_text(hours: float | None) -> str:

@@ -35,69 +35,32 @@ NEAR = 0.2  # largest relative distance of a measured mode from its mode of the 
 
 @dataclass(frozen=True, slots=True)
 class OperationalMode:
-    """One measured mode.
+    """One measured mode."""
 
-    Attributes
-    ----------
-    frequency, frequency_sigma : float
-        Hz.
-    damping, damping_sigma : float
-        Damping ratio, 1.
-    orders : int
-        Model orders at which its pole is stable.
-    is_line : bool
-        True if it hardly decays: the line of a pump rather than a mode.
-    shape : ndarray, shape (channels,)
-        Amplitudes in standard deviations of each sensor in the rest period, relative to the largest.
-    model : float or None
-        Natural frequency of the nearest mode of the model, Hz.
-    """
-
-    frequency: float
-    frequency_sigma: float
-    damping: float
+    frequency: float  # Hz
+    frequency_sigma: float  # standard deviation
+    damping: float  # ratio, 1
     damping_sigma: float
-    orders: int
-    is_line: bool
-    shape: Array
-    model: float | None
+    orders: int  # model orders at which its pole is stable
+    is_line: bool  # True if it hardly decays: the line of a pump rather than a mode
+    shape: Array  # (channels,), amplitudes in standard deviations of each sensor in the rest period, relative to the largest
+    model: float | None  # natural frequency of the nearest mode of the model, Hz
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredRest:
-    """Modes of one rest period.
+    """Modes of one rest period."""
 
-    Attributes
-    ----------
-    start, stop : float
-        s since the first stroke sample of the session.
-    channels : tuple of str
-        Sensors of the shapes.
-    model : ndarray
-        Natural frequencies of the model, Hz.
-    poles : ndarray, shape (poles, 3)
-        Frequency (Hz), model order, and 1 if the pole is stable, else 0.
-    modes : tuple of OperationalMode
-    """
-
-    start: float
+    start: float  # s since the first stroke sample of the session
     stop: float
-    channels: tuple[str, ...]
-    model: Array
-    poles: Array
+    channels: tuple[str, ...]  # sensors of the shapes
+    model: Array  # natural frequencies of the model, Hz
+    poles: Array  # (poles, 3), frequency (Hz), model order, and 1 if the pole is stable, else 0
     modes: tuple[OperationalMode, ...]
 
 
 def measured_rests(session: MeasuredSession, scene: Scene, rigging: Rigging) -> list[MeasuredRest]:
-    """Return the modes of every rest period of at least `SHORTEST_REST` seconds.
-
-    Raises
-    ------
-    BagError
-        The session has no such rest period, or neither IMU, angles nor forces.
-    UsageError
-        pyOMA-2 is not installed.
-    """
+    """Return the modes of every rest period of at least `SHORTEST_REST` seconds; BagError without one, or without sensors."""
     periods = rest_periods(session, scene, rigging)
     long_enough = [each for each in periods if each.times[-1] >= SHORTEST_REST]
     if not long_enough:

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..analysis.bending_stress import BOX
 from ..analysis.free_vibration import Vibration
 from ..health.sensor_monitor import noise_as_text
 from ..offline.recording import Recording
 from ..offline.replay import Replay
 from ..plots import AlarmSpan
 from ..plots.health import frequency_picture, moment_picture, timeline_picture
+from ..scene.schema import DEPTH_BY_GYRATION
 from ..system.atomic_files import write_atomic
 from ..texts import alarm_sentence
-from ..twin.events import EVENTS
+from ..twin.events import event_meaning
 from ..types import SECOND, SENSORS, Stream
 from .evaluation import Evaluation
 from .fatigue import LIVES, NOISE_RANGE, hours_as_text, hours_to_end, yearly_as_text
@@ -29,7 +29,10 @@ from .vibration import MODE_DISTANCE, SHORTEST_REST, course
 FILE_NAME = "report.html"
 HOUR = 3600.0  # s
 NO_JUDGE = "The rig's health was not judged."
-ASSUMED = f"Heights are not in the scene: assumed are {BOX:g} radii of gyration, as of thin-walled boxes; see --section-height."
+ASSUMED = (
+    f"Heights are not in the scene: assumed are {DEPTH_BY_GYRATION:g} radii of gyration, as of thin-walled boxes; "
+    "see --section-height."
+)
 
 
 def write_report(found: Evaluation, folder: Path) -> Path:
@@ -59,7 +62,7 @@ def _head(found: Evaluation) -> list[str]:
     rows: list[tuple[str, object]] = [
         ("first stamp", begin.strftime("%Y-%m-%d %H:%M:%S UTC")),
         ("duration, s", summary["duration_s"]),
-        ("stroke samples used", summary["samples"]),
+        (f"{recording.reads.named.removesuffix('s')} samples used", summary["samples"]),
         ("samples left out", summary["dropped"]),
         ("largest tip acceleration, m/s²", summary["tip_acceleration_max_m_s2"]),
         ("largest tip displacement, m", float(np.hypot(*found.history.tip_displacement.T).max())),
@@ -100,7 +103,6 @@ def _uncertainty(recording: Recording) -> list[tuple[str, object]]:
 
 
 def _verdict(result: Replay) -> list[str]:
-    """Return the verdict and all alarms: first those that stop the boom, then those with a cause."""
     if not result.recording.is_judged:
         return [paragraph(NO_JUDGE, "note")]
     alarms = sorted(result.summary["alarms"], key=lambda alarm: (not _stops(alarm), alarm["cause"] is None, alarm["from_s"]))
@@ -118,7 +120,6 @@ WORST = 3  # stations named in the first lines
 
 
 def _worst_stations(found: Evaluation) -> list[str]:
-    """Return the stations with the largest stresses, and the life in hours if a detail category is given."""
     worst = [f"{load.station.name}: {_stress(load)} MPa at {load.time:.1f} s" for load in found.loads[:WORST]]
     parts = [paragraph(f"Largest bending stresses: {'; '.join(worst)}.")] if worst else []
     if found.category is not None and found.fatigue:
@@ -148,7 +149,7 @@ def _alarm_times(found: Evaluation, folder: Path) -> list[str]:
     recording, history = found.result.recording, found.history
     if not recording.is_judged:
         return []
-    gaps = [AlarmSpan("cylinder_strokes", start, stop, "gap") for start, stop in history.gaps]
+    gaps = [AlarmSpan(recording.reads.stream.value, start, stop, "gap") for start, stop in history.gaps]
     spans = sorted([*gaps, *history.alarms], key=lambda alarm: alarm.start)
     path, end = folder / "timeline.png", float(history.stamps_s[-1])
     timeline_picture(path, found.name, end, spans, found.origin)
@@ -156,7 +157,6 @@ def _alarm_times(found: Evaluation, folder: Path) -> list[str]:
 
 
 def _alarm(alarm: dict[str, Any]) -> str:
-    """Return an alarm of ``summary.json`` as HTML: the sentence, its evidence, times, causes."""
     end = "it lasts to the end" if alarm["to_s"] is None else f"to {alarm['to_s']:.2f} s"
     evidence = f"{alarm['evidence']}; " if alarm["evidence"] else ""
     rows = [(rank["cause"], f"{100.0 * rank['probability']:.0f} %") for rank in alarm["ranked"]]
@@ -168,7 +168,7 @@ def _alarm(alarm: dict[str, Any]) -> str:
 
 def _residuals(folder: Path) -> list[str]:
     if not (folder / "residuals.png").is_file():
-        return [heading("Residuals"), paragraph("Nothing but the strokes was measured.")]
+        return [heading("Residuals"), paragraph("Nothing was measured but what drives the model.")]
     told = "Measured minus predicted. The band is three times the expected deviation; alarms are shaded where they show."
     return [heading("Residuals"), paragraph(told, "note"), image(folder / "residuals.png", "residuals with their bands")]
 
@@ -201,7 +201,6 @@ def _vibration(found: Evaluation, folder: Path) -> list[str]:
 
 
 def _measured(each: Vibration, model: float) -> tuple[str, str, str]:
-    """Return frequency, deviation from the model, and damping, each with standard deviation."""
     apart, sigma = 100.0 * (each.frequency / model - 1.0), 100.0 * each.frequency_sigma / model
     return (
         f"{each.frequency:.4f} ± {each.frequency_sigma:.1g}",
@@ -211,7 +210,7 @@ def _measured(each: Vibration, model: float) -> tuple[str, str, str]:
 
 
 _ESTIMATE = (
-    "Predicted: from the strokes alone. Estimated: by all sensors together, with a force at the tip that the model does not "
+    "Predicted: from the {driven} alone. Estimated: by all sensors together, with a force at the tip that the model does not "
     "know; the band is two standard deviations."
 )
 
@@ -219,7 +218,7 @@ _ESTIMATE = (
 def _tip(found: Evaluation, folder: Path) -> list[str]:
     parts = [heading("Tip")]
     if found.history.estimate is not None:
-        parts.append(paragraph(_ESTIMATE, "note"))
+        parts.append(paragraph(_ESTIMATE.format(driven=found.result.recording.reads.named), "note"))
     parts.append(image(folder / "tip.png", "tip displacement and acceleration"))
     return parts + [image(folder / name, name) for name in ("spectrum.png", "posture.png") if (folder / name).is_file()]
 
@@ -252,7 +251,6 @@ def _load(load: Load) -> tuple[object, ...]:
 
 
 def _stress(load: Load) -> str:
-    """Return the stress in MPa, with the standard deviation of the unknown load's part if it is known."""
     deviation = "" if np.isnan(load.sigma) else f" ± {1e-6 * load.sigma / load.modulus:.2g}"
     return f"{1e-6 * load.stress:.3g}{deviation}"
 
@@ -280,10 +278,11 @@ def _fatigue(found: Evaluation) -> list[str]:
 
 def _events(found: Evaluation) -> list[str]:
     gaps = [(f"{start:.3f} to {stop:.3f} s", stop - start) for start, stop in found.history.gaps]
-    events = [(name, count, EVENTS.get(name, "seen in a message")) for name, count in found.result.summary["events"].items()]
+    reads, counted = found.result.recording.reads, found.result.summary["events"]
+    events = [(name, count, event_meaning(name, reads) or "seen in a message") for name, count in counted.items()]
     return [
         heading("Gaps and events"),
-        table(("gap of the strokes", "s"), gaps) if gaps else paragraph("No gap in the strokes."),
+        table((f"gap of the {reads.named}", "s"), gaps) if gaps else paragraph(f"No gap in the {reads.named}."),
         table(("event", "times", "what it is"), events) if events else paragraph("Nothing out of the ordinary."),
     ]
 

@@ -126,7 +126,6 @@ class BatchMeans:
 
 
 def _frequencies(rests: list[RestPeriod]) -> Iterator[Quantity]:
-    """Yield the ratio of measured to model frequency, and the damping ratio, of every measured mode."""
     for mode in sorted({mode for rest in rests for mode in rest.measured}):
         seen = [(rest.model[mode], rest.measured[mode]) for rest in rests if mode in rest.measured]
         ratios = np.array([(each.frequency / model, each.frequency_sigma / model) for model, each in seen])

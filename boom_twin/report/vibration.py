@@ -166,7 +166,6 @@ def measured_motion(history: History) -> Series:
 
 
 def _by_mode(found: list[Vibration], model: list[float]) -> dict[int, Vibration]:
-    """Return the surest vibration near every mode."""
     near: dict[int, Vibration] = {}
     for each in found if model else ():
         mode = int(np.argmin(np.abs(np.array(model) - each.frequency)))

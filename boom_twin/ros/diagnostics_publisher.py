@@ -24,9 +24,6 @@ class DiagnosticsPublisher:
 
     Parameters
     ----------
-    node : Node
-    topic : Topic
-        Where they are published.
     hardware_id : str
         What is diagnosed; empty: the node's name.
     """

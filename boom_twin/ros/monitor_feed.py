@@ -22,16 +22,11 @@ from .bag.subscriptions import resolved_topics
 from .runtime import message_class, qos_profile
 
 NAME = "boom_twin_monitor"
-DEPTH = 1000
-"""Messages that may wait for the next look, for every topic: seconds of a session."""
-CAPACITY = 150_000
-"""Rows kept of every table: twelve minutes at 200 Hz."""
-MOST = 400
-"""Messages of one topic taken in one look, so that a flood of them leaves time for the pages."""
-RARE = (Output.HEALTH, Output.TIP_UNCERTAINTY, Output.DIAGNOSTICS)
-"""Outputs of which none may be missed."""
-MOST_BYTES = 4_000_000
-"""Bytes of one topic after which no more of its messages are taken in one look."""
+DEPTH = 1000  # messages that may wait for the next look, for every topic: seconds of a session
+CAPACITY = 150_000  # rows kept of every table: twelve minutes at 200 Hz
+MOST = 400  # messages of one topic taken in one look, so that a flood of them leaves time for the pages
+RARE = (Output.HEALTH, Output.TIP_UNCERTAINTY, Output.DIAGNOSTICS)  # outputs of which none may be missed
+MOST_BYTES = 4_000_000  # bytes of one topic after which no more of its messages are taken in one look
 
 
 class TopicFeed(Feed):
@@ -39,12 +34,6 @@ class TopicFeed(Feed):
 
     Messages are taken by `poll`, not by an executor, which would wake up for each of a thousand in a second.
     Rows are heard as best effort, so the node never keeps or repeats one for it; states and events are heard reliably.
-
-    Parameters
-    ----------
-    topics : Topics
-    scene : Scene, optional
-        As of a `Feed`.
     """
 
     def __init__(self, topics: Topics, scene: Scene | None = None) -> None:

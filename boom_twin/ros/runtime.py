@@ -69,12 +69,9 @@ def one_line(error: BaseException) -> str:
     return " ".join(re.split(r", at \.?/", str(error))[0].split()).rstrip(".") or type(error).__name__
 
 
-WAKE = 0.2
-"""Time (s) between looks at whether it is over."""
-LATE = 0.5
-"""Time (s) of work on messages, without a turn of the timers, after which the row of the events executor is too long."""
-PAUSE = 0.05
-"""Most time (s) between two messages that counts as work on messages: one long callback makes no row."""
+WAKE = 0.2  # time (s) between looks at whether it is over
+LATE = 0.5  # time (s) of work on messages, without a turn of the timers, after which the row of the events executor is too long
+PAUSE = 0.05  # most time (s) between two messages that counts as work on messages: one long callback makes no row
 TURN = 10.0
 """Time (s) of a turn of the events executor: each leaves 32 bytes behind in rclpy 7.1, half a megabyte in an hour of `WAKE`."""
 

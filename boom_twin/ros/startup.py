@@ -59,18 +59,12 @@ class StopSignal:
     """Stop request by one of `STOPS`: checked between callbacks; KeyboardInterrupt if a callback takes too long.
 
     rclpy reports an exception inside a callback as a fault of the callback. Use this only in a process without unsaved data.
-
-    Attributes
-    ----------
-    asked : bool
-        True after a signal.
     """
 
-    LONGEST = 0.5
-    """Time (s) allowed to a callback before it is interrupted."""
+    LONGEST = 0.5  # time (s) allowed to a callback before it is interrupted
 
     def __init__(self) -> None:
-        self.asked = False
+        self.asked = False  # True after a signal
         on_stop_signal(self._ask)
 
     def _ask(self) -> None:

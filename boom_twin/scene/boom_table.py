@@ -92,10 +92,7 @@ _HEADER = re.compile(r"(\w+?)(?:_(x|y|start|end|low|high|along|left))?\s*(?:[\[(
 def read_table(path: Path) -> tuple[BoomTable, Document]:
     """Return the table in a file (.csv, .tsv, .txt, else YAML), and the document with the lines of its values.
 
-    Raises
-    ------
-    SceneError
-        With every fault that was found: place, value, bound, remedy.
+    SceneError with every fault that was found: place, value, bound, remedy.
     """
     text = read_text(path, TABLE_FILE)
     document = csv_document(text, str(path)) if path.suffix.lower() in TABLES else parse(text, str(path), TABLE_FILE)

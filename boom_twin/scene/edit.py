@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, TypeVar, cast
@@ -24,6 +24,7 @@ from .load import examine_text, parse, structure, text_of
 from .oil_spring import middle_stiffness
 from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
 
+DIGITS = 1e-5  # relative; values are written with six digits
 Body = TypeVar("Body", RigidPart, CylinderPart)
 
 
@@ -36,35 +37,23 @@ def parameter_names(scene: Scene) -> tuple[str, ...]:
     for i, section in enumerate(scene.sections):
         names += [f"section_{i + 1}.EI"] if scene.is_flexible(i) else []
         names += [f"section_{i + 1}.beta"] if scene.is_flexible(i) and section.beta else []
-        names += [f"section_{i + 1}.mass"] if section_mass(section) > 0.0 else []
+        names += [f"section_{i + 1}.mass"] if section.mass > 0.0 else []
     elastic = [f"base.{key}" for key in ("stiffness", "damping") if getattr(scene.base, key) is not None]
     return (*names, *elastic, "tip.payload", "line_fill", "base.inclination")
 
 
 def parameter(scene: Scene, name: str) -> float:
-    """Return the value of one parameter, SI.
-
-    Raises
-    ------
-    UsageError
-        The scene has no parameter of that name.
-    """
+    """Return the value of one parameter, SI; UsageError if the scene has none of that name."""
     part, key = _owner(scene, name)
     if isinstance(part, Cylinder) and key == "k":
         return middle_stiffness(part)
     if isinstance(part, Section) and key == "EI":
         return scene.material.E * (part.I or 0.0)
-    return section_mass(part) if isinstance(part, Section) and key == "mass" else float(getattr(part, key) or 0.0)
+    return part.mass if isinstance(part, Section) and key == "mass" else float(getattr(part, key) or 0.0)
 
 
 def with_parameters(scene: Scene, values: Mapping[str, float]) -> Scene:
-    """Return the scene with other values of some parameters, SI; what is not named stays.
-
-    Raises
-    ------
-    UsageError
-        The scene has no parameter of that name, or the value is not one that a scene may have.
-    """
+    """Return the scene with other values of some parameters, SI; UsageError for a name or a value that it cannot have."""
     for name, value in values.items():
         scene = _with_one(scene, name, float(value))
     return scene
@@ -75,12 +64,6 @@ def with_rigid_cylinders(scene: Scene) -> Scene:
     none = dict.fromkeys(("k", "oil", "d"))
     struts = [joint.model_copy(update={"cylinder": joint.cylinder.model_copy(update=none)}) for joint in scene.joints]
     return scene.model_copy(update={"joints": tuple(struts)})
-
-
-def section_mass(section: Section) -> float:
-    """Return the mass (kg) of root, beam and head."""
-    beam = 0.0 if section.beam is None or section.rho_A is None else section.rho_A * (section.beam[1] - section.beam[0])
-    return beam + sum(part.mass for part in (section.root, section.head) if part is not None)
 
 
 def _with_one(scene: Scene, name: str, value: float) -> Scene:
@@ -96,7 +79,7 @@ def _with_one(scene: Scene, name: str, value: float) -> Scene:
     elif isinstance(part, Section) and key == "EI":
         changes = {"I": value / scene.material.E}
     elif isinstance(part, Section) and key == "mass":
-        factor = value / section_mass(part)
+        factor = value / part.mass
         changes = {end: scaled(body, factor) for end in ("root", "head") if (body := getattr(part, end)) is not None}
         changes |= {each: factor * own for each in ("rho_A", "rho_I") if (own := getattr(part, each)) is not None}
     return cast(Scene, _with(scene, _place(name), part.model_copy(update=changes)))
@@ -108,7 +91,6 @@ def scaled(part: Body, factor: float) -> Body:
 
 
 def _place(name: str) -> Place:
-    """Return the place of the block that has a parameter."""
     owner, dot, _ = name.partition(".")
     kind, _, number = owner.partition("_")
     if kind == "cylinder":
@@ -168,22 +150,41 @@ def _with(part: Any, place: Sequence[str | int], value: Any) -> Any:
     return part.model_copy(update={step: _with(getattr(part, step, None), rest, value)})
 
 
-def rewritten(text: str, scene: Scene, edits: Iterable[Edit]) -> str:
-    """Return the text of a scene after `edits`; `scene` is what the text describes.
+def rewritten(text: str, scene: Scene, wanted: Scene) -> str:
+    """Return the text of `scene` with the values in which `wanted` differs, its comments kept.
 
-    Where blocks share their text (YAML aliases) an edit of one would change the other too: then the result is written anew,
-    without comments.
+    Blocks that share their text (YAML aliases) cannot be changed apart: then all of it is written anew, without comments.
     """
-    edits = tuple(edits)
-    wanted = edited(scene, edits)
     try:
-        for edit in edits:
-            text = with_value(text, edit.place, edit.value)
-        found, _, faults = structure(parse(text, "edited scene"))
+        for place, value in _changes(scene.model_dump(), wanted.model_dump(), ()):
+            text = with_value(text, place, value)
+        found, _, faults = structure(parse(text, "changed scene"))
     except (YAMLError, SceneError):
         return anew(wanted)
-    same = found is not None and not faults and found.model_dump() == wanted.model_dump()
+    same = found is not None and not faults and _same(found.model_dump(), wanted.model_dump())
     return text if same else anew(wanted)
+
+
+def _changes(before: Any, after: Any, place: Place) -> Iterator[tuple[Place, Any]]:
+    """Yield the places of the single values that differ, with their new ones."""
+    if isinstance(after, dict):
+        for key, value in after.items():
+            yield from _changes(before.get(key) if isinstance(before, dict) else None, value, (*place, key))
+    elif isinstance(after, tuple) and isinstance(before, tuple):
+        for i, (one, other) in enumerate(zip(before, after, strict=True)):
+            yield from _changes(one, other, (*place, i))
+    elif after != before:
+        yield place, after
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, dict):
+        return isinstance(other, dict) and one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
+    if isinstance(one, tuple | list):
+        return isinstance(other, tuple | list) and len(one) == len(other) and all(map(_same, one, other))
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=DIGITS)
+    return bool(one == other)
 
 
 def anew(scene: Scene) -> str:
@@ -192,15 +193,7 @@ def anew(scene: Scene) -> str:
 
 
 def changed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
-    """Return the scene with other values, checked as a file is: parameters, ``payload``, keys at the top of a scene file.
-
-    Raises
-    ------
-    UsageError
-        There is no such key or parameter.
-    SceneError
-        The scene cannot have such values.
-    """
+    """Return the scene with other values, checked as a file is; see `Scene.with_`."""
     for name, value in changes.items():
         if name in ("payload", "tip.payload"):
             scene = cast(Scene, _with(scene, ("tip",), (scene.tip or Tip()).model_copy(update={"payload": value})))

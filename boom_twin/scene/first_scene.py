@@ -15,13 +15,12 @@ import numpy as np
 
 from ..config.yaml_text import Document, Place, yaml_text
 from ..errors import ABSENT, Fault, SceneError
-from ..kernels.elements.linkage import cylinder_length
 from ..types import Array
 from .boom_table import BoomTable, BoxSection, DrawnJoint, odd_boxes, second_moment
 from .checks.geometry import NEXT_TO
 from .checks.sizes import TURNS
 from .checks.whole_boom import straight_boom
-from .kinematics import RANGE_SAMPLES, linkage_of, stroke_curve
+from .kinematics import RANGE_SAMPLES, joint_curve, linkage_of, stroke_curve
 from .load import examine_text, with_end_mark
 from .oil_spring import middle_stiffness, stiffness
 from .schema import Cylinder, JointGeometry, Oil, Scene, Section
@@ -36,10 +35,7 @@ RANGE = re.compile(r"joints\[\d+\]\.range_deg")
 def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str, Scene, list[Fault]]:
     """Return the scene's text, the scene, and its warnings at the table's keys and lines.
 
-    Raises
-    ------
-    SceneError
-        The boom of the table cannot be: joints that do not reach all of their ranges, postures out of reach.
+    SceneError if the boom of the table cannot be: joints that do not reach all of their ranges, postures out of reach.
     """
     text, scene, faults, odd = _examined(table, source)
     narrower = [each for each in odd if RANGE.fullmatch(each.path) and not each.bound.startswith((NEXT_TO, TURNS))]
@@ -92,7 +88,7 @@ def _text(table: BoomTable, source: str, first: float | None) -> str:
         lines += _item(_section(table, section, first))
     lines += ["", "joints:"]
     for i, joint in enumerate(table.joints):
-        lines += [f"  # joint {i + 1}: bore {joint.bore:g} m, rod {joint.rod:g} m", *_item(_joint(table, i, joint, first))]
+        lines += [f"  # joint {i + 1}: bore {joint.bore:g} m, rod {joint.rod:g} m", *_item(_joint(table, joint, first))]
     lines += ["", f"tip: {{payload: {yaml_text(table.payload)}}}"] if table.payload else []
     lines += [f"line_fill: {yaml_text(table.line_fill)}"] if table.line_fill else []
     return with_end_mark("\n".join([*lines, "", *_postures(table)]))
@@ -135,16 +131,16 @@ def _end(per_metre: float, start: float, stop: float, height: float) -> tuple[di
     return values, f"[estimate] m = {ENDS:g} rho_A a, a = {length:.3g}; m (a^2 + h^2) / 12"
 
 
-def _joint(table: BoomTable, i: int, joint: DrawnJoint, first: float | None) -> list[Row]:
+def _joint(table: BoomTable, joint: DrawnJoint, first: float | None) -> list[Row]:
     told = {"range_deg": "lowest and highest joint angle, degrees"}
     shared = joint.model_dump(include=set(JointGeometry.model_fields), exclude_none=True)
     rows: list[Row] = [(key, value, told.get(key, "")) for key, value in shared.items()]
     rows.append(("cylinder", "", ""))
-    return rows + [(f"  {key}", value, told) for key, value, told in _cylinder(table, i, joint, first)]
+    return rows + [(f"  {key}", value, told) for key, value, told in _cylinder(table, joint, first)]
 
 
-def _cylinder(table: BoomTable, i: int, joint: DrawnJoint, first: float | None) -> list[Row]:
-    closed, stroke, told = _stroke(table, i, joint)
+def _cylinder(table: BoomTable, joint: DrawnJoint, first: float | None) -> list[Row]:
+    closed, stroke, told = _stroke(table, joint)
     rho = table.material.rho or 0.0
     values = joint.model_dump(include={"bore", "rod", "cap_line", "rod_line"})
     oil = Oil(bulk_modulus=table.bulk_modulus, **values)
@@ -165,26 +161,25 @@ def _cylinder(table: BoomTable, i: int, joint: DrawnJoint, first: float | None) 
     return rows
 
 
-def _stroke(table: BoomTable, i: int, joint: DrawnJoint) -> tuple[float, float, str]:
+def _stroke(table: BoomTable, joint: DrawnJoint) -> tuple[float, float, str]:
     """Return closed length and stroke (m), and where they come from."""
     if joint.closed_length is not None and joint.max_stroke is not None:
         return joint.closed_length, joint.max_stroke, "from the table"
-    least, most = _lengths(table, i, joint)
+    least, most = _lengths(table, joint)
     spare = SPARE * (most - least)
     closed = joint.closed_length or math.floor(1e3 * (least - spare)) / 1e3
     stroke = joint.max_stroke or math.ceil(1e3 * (most + spare - closed)) / 1e3
     return closed, stroke, f"over range_deg the pins are {least:.4g} to {most:.4g} m apart; {100 * SPARE:g} % to spare"
 
 
-def _lengths(table: BoomTable, i: int, joint: DrawnJoint) -> tuple[float, float]:
+def _lengths(table: BoomTable, joint: DrawnJoint) -> tuple[float, float]:
     """Return the least and greatest distance (m) of the pins over the range; 1 and 2 if they are incomplete or never meet."""
     first = Section(length=table.sections[0].length, rod_pin=table.sections[0].rod_pin)
     try:
         row = linkage_of(joint, table.base, first)
     except TypeError:  # a pin is not given: the checks of the scene name it
         return 1.0, 2.0
-    with np.errstate(invalid="ignore"):
-        lengths = cylinder_length(row, np.radians(np.linspace(*joint.range_deg, RANGE_SAMPLES)))[0]
+    lengths = joint_curve(row, np.radians(np.linspace(*joint.range_deg, RANGE_SAMPLES))).lengths
     lengths = lengths[np.isfinite(lengths)]
     return (float(lengths.min()), float(lengths.max())) if lengths.size else (1.0, 2.0)
 

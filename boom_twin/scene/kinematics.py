@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from ..types import Array
 from .schema import Base, JointGeometry, Scene, Section
 
 RANGE_SAMPLES = 721  # angles of a joint's range at which it is examined
+START_SAMPLES = 181  # at which the angle of a stroke is looked for first
 MARGIN = math.radians(1.0)  # beyond range_deg: strokes at the ends, with their sensors' noise, still have an angle
 
 
@@ -54,16 +55,25 @@ def linkage_of(joint: JointGeometry, base: Base | None, first: Section | None) -
 
 def stroke_curve(scene: Scene, index: int, angles: Array) -> Array:
     """Return strokes (m) of joint `index` at relative `angles` (rad), shape as `angles`; NaN where the links do not close."""
-    row, closed = linkage(scene, index), scene.joints[index].cylinder.closed_length
-    with np.errstate(invalid="ignore"):
-        return np.asarray(cylinder_length(row, np.atleast_1d(angles))[0] - closed)
+    return joint_curve(linkage(scene, index), np.atleast_1d(angles)).lengths - scene.joints[index].cylinder.closed_length
 
 
-def transmission_angles(row: np.record, angles: Array) -> Array:
-    """Return the angles (rad, 0 to pi/2) of the links of a six-bar in Q, 0 at a dead centre; NaN where they do not meet."""
+class JointCurve(NamedTuple):
+    """A joint over its angles; NaN where the links do not meet."""
+
+    lengths: Array  # of the cylinder, pin to pin, m
+    levers: Array  # size of ds/dphi, m
+    between: Array  # angle of the links at Q, 0 (a dead centre) to 90 deg; 90 for kind A
+
+
+def joint_curve(row: np.record, angles: Array) -> JointCurve:
+    """Return the curve of a joint at `angles` (rad)."""
     with np.errstate(invalid="ignore"):
+        lengths, slopes = cylinder_length(row, angles)
+        if row.mount == DIRECT:
+            return JointCurve(lengths, np.abs(slopes), np.full(np.shape(angles), 90.0))
         left, right = link_angles(row, angles)
-        return np.asarray(np.abs(np.arcsin(np.sin(left - right))))
+        return JointCurve(lengths, np.abs(slopes), np.degrees(np.abs(np.arcsin(np.sin(left - right)))))
 
 
 def stroke_range(scene: Scene, index: int, samples: int) -> tuple[float, float]:
@@ -77,18 +87,9 @@ def stroke_range(scene: Scene, index: int, samples: int) -> tuple[float, float]:
 
 
 def section_angles(scene: Scene, posture: str) -> tuple[float, ...]:
-    """Return the section angles to the base (deg) of a posture.
+    """Return the section angles to the base (deg) of a posture: a name of the scene, or the angles themselves: ``90,-23,-23``.
 
-    Parameters
-    ----------
-    scene : Scene
-    posture : str
-        A name of the scene, or the angles themselves, as `envelope` and `init` print them: ``90,-23,-23``.
-
-    Raises
-    ------
-    UsageError
-        There is no such name, or a joint cannot take its angle.
+    UsageError if there is no such name, or a joint cannot take its angle.
     """
     if posture in scene.postures:
         return scene.postures[posture]
@@ -123,17 +124,11 @@ def strokes_of_angles(scene: Scene, relative: Array) -> Array:
     return np.array([stroke_curve(scene, i, relative[i : i + 1])[0] for i in range(len(scene.joints))])
 
 
-def joint_angles_of_strokes(
-    scene: Scene, strokes: Array, near: Array | None = None, samples: int = 181, name: str = "stroke"
-) -> Array:
+def joint_angles_of_strokes(scene: Scene, strokes: Array, near: Array | None = None, name: str = "stroke") -> Array:
     """Return relative angles (rad), shape (n,), of the undeformed boom at absolute `strokes` (m), called by `name` in errors.
 
-    Where a stroke belongs to two angles, the one next to `near` (rad), shape (n,), if given.
-
-    Raises
-    ------
-    UsageError
-        If a stroke is not reached anywhere in its joint's ``range_deg``, widened by one degree.
+    Where a stroke belongs to two angles, the one next to `near` (rad), shape (n,), if given. UsageError if a stroke is not
+    reached anywhere in its joint's ``range_deg``, widened by one degree.
     """
     rows = np.zeros(len(scene.joints), LINKAGE).view(np.recarray)
     for i in range(len(rows)):
@@ -141,9 +136,9 @@ def joint_angles_of_strokes(
     ranges = np.radians([joint.range_deg for joint in scene.joints]) + np.array([-MARGIN, MARGIN])
     lengths = np.array([joint.cylinder.closed_length for joint in scene.joints]) + strokes
     angles, near = np.empty(len(rows)), np.full(len(rows), math.nan) if near is None else np.asarray(near, float)
-    angles_of_lengths(rows, lengths, near, ranges[:, 0].copy(), ranges[:, 1].copy(), samples, angles)
+    angles_of_lengths(rows, lengths, near, ranges[:, 0].copy(), ranges[:, 1].copy(), START_SAMPLES, angles)
     for i in np.flatnonzero(~np.isfinite(angles)).tolist():
-        curve = stroke_curve(scene, i, np.linspace(ranges[i, 0], ranges[i, 1], samples))
+        curve = stroke_curve(scene, i, np.linspace(ranges[i, 0], ranges[i, 1], START_SAMPLES))
         raise UsageError(
             f"{name}_{i + 1} = {float(strokes[i]):.6g} m: joint {i + 1} reaches {np.nanmin(curve):.6g} to "
             f"{np.nanmax(curve):.6g} m in its range_deg {scene.joints[i].range_deg}. Give a {name} inside."
@@ -164,10 +159,8 @@ CYLINDER, LEFT, RIGHT = "cylinder_{}_swivel", "link_l_{}_swivel", "link_r_{}_swi
 class PassiveJoints:
     """Positions of the passive joints of one scene.
 
-    Attributes
-    ----------
-    names : tuple of str
-        ``cylinder_1_swivel``, then of every six-bar i ``cylinder_i_swivel``, ``link_l_i_swivel``, ``link_r_i_swivel``.
+    `names` are ``cylinder_1_swivel``, then of every six-bar i ``cylinder_i_swivel``, ``link_l_i_swivel``,
+    ``link_r_i_swivel``.
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -39,13 +39,7 @@ SCENE = Kind("scene", "boom_twin scene")
 
 
 def read_text(path: Path, kind: Kind = SCENE) -> str:
-    """Return the text of a scene file, or of another of its kind.
-
-    Raises
-    ------
-    SceneError
-        If there is no such file, or it is no UTF-8 text of at most `MAX_BYTES`.
-    """
+    """Return the text of a scene file, or of another `kind`; SceneError unless it is UTF-8 text of at most `MAX_BYTES`."""
     try:
         with path.open("rb") as stream:
             data = stream.read(MAX_BYTES + 1)
@@ -62,12 +56,9 @@ def read_text(path: Path, kind: Kind = SCENE) -> str:
 
 
 def parse(text: str, source: str, kind: Kind = SCENE) -> Document:
-    """Return the plain values of a YAML text, sequences as tuples, with the line of each.
+    """Return the plain values of a YAML text, sequences as tuples, with the line of each; SceneError if it is not YAML.
 
-    Raises
-    ------
-    SceneError
-        If the text is not YAML at all. What is YAML but not allowed here is in ``Document.faults``.
+    What is YAML but not allowed here is in ``Document.faults``.
     """
     try:
         reader = _SceneReader(text, tuple)
@@ -340,5 +331,4 @@ def _implausible(draft: Draft, scene: Scene, findings: list[Fault]) -> list[Faul
 
 
 def _block(finding: Fault) -> str:
-    """Return ``sections[1]`` of ``sections[1].root.mass``."""
     return finding.path.partition(".")[0]

@@ -1,8 +1,7 @@
 """The scene schema: every part of a boom as a validated pydantic model, with meaning, unit and bounds of each value.
 
-Frames, signs and the meaning of every point are told in the comments of the default scene (``boom_twin scene``). Error messages
-quote the descriptions of the fields. A number with another unit is converted to the unit that the description states.
-All values are SI. ``None`` means "not named, therefore not in the model".
+Frames, signs and points are told in the comments of the default scene (``boom_twin scene``). Error messages quote the
+descriptions. A number with another unit is converted to the one stated there. ``None``: not named, so not in the model.
 """
 
 from __future__ import annotations
@@ -32,6 +31,8 @@ else:
     LawName = Literal[_LAWS]  # pydantic refuses any other, and names them
 
 IDEAL_BELOW = 1e-6  # m; a pin with less radial clearance is taken for ideal
+DEPTH_BY_GYRATION = 2.4  # depth of a drawn section over its radius of gyration: about that of a thin-walled box
+DEPTH_BY_LENGTH = 0.05  # of its length, where a section has no A and I
 MODES = "the number of bending coordinates per flexible part: a whole number from 0 to 10"
 AXIAL = "true or false, whether flexible parts stretch"
 GEOMETRIC = "true or false, whether flexible parts have geometric stiffness"
@@ -93,6 +94,25 @@ class Section(Part):
     root: RigidPart | None = Field(default=None, description="a block with mass, com, inertia of the rigid inboard part")
     head: RigidPart | None = Field(default=None, description="a block with mass, com, inertia of the rigid outboard part")
     rod_pin: Point | None = Field(default=None, description="[x, y] of the rod pin of cylinder 1, m")
+
+    @property
+    def beam_mass(self) -> float:
+        """Mass of the beam without concrete, kg; 0 without a beam."""
+        return 0.0 if self.beam is None else (self.rho_A or 0.0) * (self.beam[1] - self.beam[0])
+
+    @property
+    def mass(self) -> float:
+        """Mass of beam, root and head, kg."""
+        return sum((part.mass for part in (self.root, self.head) if part is not None), start=self.beam_mass)
+
+    @property
+    def depth(self) -> float:
+        """Depth (m) to draw the section with: its height, else that of a box with its A and I."""
+        if self.height is not None:
+            return self.height
+        if self.A is None or self.I is None:
+            return DEPTH_BY_LENGTH * self.length
+        return DEPTH_BY_GYRATION * math.sqrt(self.I / self.A)
 
     @property
     def section_modulus(self) -> float | None:
@@ -157,6 +177,9 @@ class Cylinder(Part):
         return self.k is not None or self.oil is not None
 
 
+BEFORE = "the outboard pivot of the section before"
+
+
 class JointGeometry(Part):
     """Pins, links and range of a joint that turns one section: kind A (slider-crank), B1, B2 or B3 (six-bar).
 
@@ -165,12 +188,8 @@ class JointGeometry(Part):
 
     kind: Literal["A", "B1", "B2", "B3"] = Field(description="A, B1, B2 or B3")
     range_deg: tuple[Finite, Finite] = Field(description="[low, high] of the relative joint angle, degrees")
-    C: Point | None = Field(
-        default=None, description="[x, y] of the barrel pin from the outboard pivot of the section before, m"
-    )
-    D: Point | None = Field(
-        default=None, description="[x, y] of the pivot of link L from the outboard pivot of the section before, m"
-    )
+    C: Point | None = Field(default=None, description=f"[x, y] of the barrel pin from {BEFORE}, m")
+    D: Point | None = Field(default=None, description=f"[x, y] of the pivot of link L from {BEFORE}, m")
     E: Point | None = Field(default=None, description="[x, y] of the pin of link R from the pivot of its own section, m")
     side: Literal["left", "right"] | None = Field(default=None, description="left or right of D->E, where the links meet")
     lL: Positive | None = Field(default=None, description="the length of link L, m")
@@ -275,17 +294,10 @@ class Scene(SummaryDisplay, Part):
         **named
             ``payload`` (kg), or keys at the top of a scene file: ``line_fill``, ``modes``, ``gravity``, ..; None takes one out.
 
-        Returns
-        -------
-        Scene
-            A new one; this one stays as it is.
-
         Raises
         ------
-        UsageError
-            There is no such key or parameter.
-        SceneError
-            The scene cannot have such values: all faults.
+        UsageError, SceneError
+            There is no such key or parameter; the scene cannot have such values: all faults.
         """
         from .edit import changed
 
@@ -334,17 +346,3 @@ class Scene(SummaryDisplay, Part):
     def is_flexible(self, index: int) -> bool:
         """Return True if section `index` (0-based) bends."""
         return self.sections[index].beam is not None and self.modes_of(index) > 0
-
-
-DEPTH_BY_GYRATION = 2.4  # depth of a drawn section over its radius of gyration: about that of a thin-walled box
-DEPTH_BY_LENGTH = 0.05  # of its length, where a section has no A and I
-
-
-def section_depth(scene: Scene, i: int) -> float:
-    """Return the depth (m) to draw section `i` (0-based) with: its height, else that of a box with its A and I."""
-    section = scene.sections[i]
-    if section.height is not None:
-        return section.height
-    if section.A is None or section.I is None:
-        return DEPTH_BY_LENGTH * section.length
-    return DEPTH_BY_GYRATION * math.sqrt(section.I / section.A)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from .checks.linkages import LinkageAccount, linkage_account
 from .kinematics import RANGE_SAMPLES, stroke_range
 from .oil_spring import stiffness_over_stroke
-from .schema import IDEAL_BELOW, Base, Joint, Pin, Scene
+from .schema import IDEAL_BELOW, Joint, Pin, Scene, Section
 from .segmentation import Split, flexible_parts, splits
 
 
@@ -88,158 +88,112 @@ def _absent(block: str, items: list[dict[str, str]]) -> list[LeftOut]:
 
 
 UNKNOWNS_A, UNKNOWNS_B, UNKNOWNS_PIN, UNKNOWNS_BASE = 2, 6, 2, 1
+"""Unknowns of joint A (angle of the section, cylinder force), of a six-bar (angles of section and two links, two components of
+the pin force, cylinder force), of a pin with clearance (offset of its journal), and of an elastic base (its turn)."""
 
 
 @dataclass(frozen=True, slots=True)
 class SectionAccount:
-    """Section `number` (from 1). Lengths in m, masses in kg.
-
-    ``parts`` are the ends of its flexible parts, ``bending`` and ``axial`` the bending and axial coordinates of each,
-    ``unknowns`` those of all its parts together. ``beam_mass`` counts without the line fill.
-    """
+    """Section `number` (from 1) in the model."""
 
     number: int
-    length: float
-    has_beam: bool
-    parts: tuple[tuple[float, float], ...]
+    section: Section
+    parts: tuple[tuple[float, float], ...]  # ends of its flexible parts, m
     splits: tuple[Split, ...]
-    bending: int
+    bending: int  # coordinates of each part
     axial: int
-    beam_mass: float
-    root_mass: float
-    head_mass: float
-    fill_mass: float
-    unknowns: int
+    fill_mass: float  # kg
 
     @property
     def mass(self) -> float:
-        """All of the section, kg."""
-        return self.beam_mass + self.root_mass + self.head_mass + self.fill_mass
+        """All of the section with its line fill, kg."""
+        return self.section.mass + self.fill_mass
+
+    @property
+    def unknowns(self) -> int:
+        """Coordinates of all parts together."""
+        return len(self.parts) * (self.bending + self.axial)
 
 
 @dataclass(frozen=True, slots=True)
 class JointAccount:
-    """Joint `number` (from 1) with its links and its cylinder. Masses in kg, strokes in m, angles in degrees.
+    """Joint `number` (from 1) with its links and its cylinder.
 
-    ``stroke_low``, ``stroke_high`` are reached over ``range_deg`` where links close and the cylinder reaches. The joint
-    of kind A has two unknowns (angle of the section, cylinder force), a six-bar six (angles of section and two links,
-    two components of the pin force, cylinder force). ``k_over_stroke`` (N/m) is at
-    `boom_twin.scene.oil_spring.STATIONS` for a cylinder with oil, else empty. ``side`` is empty for kind A.
+    ``stroke_low``, ``stroke_high`` (m) are reached over ``range_deg`` where links close and the cylinder reaches.
+    ``k_over_stroke`` (N/m) is at `boom_twin.scene.oil_spring.STATIONS` for a cylinder with oil, else empty.
     """
 
     number: int
-    kind: str
-    range_deg: tuple[float, float]
+    joint: Joint
     stroke_low: float
     stroke_high: float
-    max_stroke: float
-    k: float | None
     k_over_stroke: tuple[float, ...]
-    d: float | None
-    side: str
     linkage: LinkageAccount
-    link_mass: float
-    barrel_mass: float
-    rod_mass: float
-    unknowns: int
 
     @property
-    def mass(self) -> float:
-        """Links, barrel and rod, kg."""
-        return self.link_mass + self.barrel_mass + self.rod_mass
+    def unknowns(self) -> int:
+        """Unknowns of a joint of its kind."""
+        return UNKNOWNS_A if self.joint.kind == "A" else UNKNOWNS_B
 
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """Everything about a scene's model. ``length`` is the sum of all sections (m), ``payload`` in kg.
+    """Model that a scene describes; ``pins`` are those with clearance."""
 
-    ``pins`` are those with clearance; each has two unknowns, the offset of its journal. An elastic ``base`` has one
-    unknown, its turn.
-    """
-
+    scene: Scene
     sections: tuple[SectionAccount, ...]
     joints: tuple[JointAccount, ...]
     pins: tuple[Pin, ...]
-    payload: float
-    base: Base
     left_out: tuple[LeftOut, ...]
-
-    @property
-    def length(self) -> float:
-        """Straight boom, pivot of section 1 to the tip, m."""
-        return sum(section.length for section in self.sections)
 
     @property
     def mass(self) -> float:
         """Whole boom with its cylinders, line fill and payload, kg."""
-        return sum(s.mass for s in self.sections) + sum(j.mass for j in self.joints) + self.payload
+        return mass_of(self.scene)
 
     @property
     def unknowns(self) -> int:
         """Unknowns of one step."""
         own = sum(s.unknowns for s in self.sections) + sum(j.unknowns for j in self.joints)
-        return own + UNKNOWNS_PIN * len(self.pins) + UNKNOWNS_BASE * (self.base.stiffness is not None)
+        return own + UNKNOWNS_PIN * len(self.pins) + UNKNOWNS_BASE * (self.scene.base.stiffness is not None)
+
+
+def mass_of(scene: Scene) -> float:
+    """Return the mass of a boom with its load, kg."""
+    sections = sum(section.mass + _fill_mass(scene, section) for section in scene.sections)
+    return sections + sum(joint.mass for joint in scene.joints) + scene.payload
 
 
 def weight_of(scene: Scene) -> float:
     """Return the weight of a boom with its load, N."""
-    sections = sum(_section(scene, i).mass for i in range(len(scene.sections)))
-    return (sections + sum(joint.mass for joint in scene.joints) + scene.payload) * math.hypot(*scene.gravity)
+    return mass_of(scene) * math.hypot(*scene.gravity)
 
 
 def explain(scene: Scene) -> Account:
     """Return the bookkeeping of the model that a scene describes."""
     numbers = range(len(scene.sections))
+    pins = (pin for i in numbers for owner in ("cylinder", "joint") for pin in scene.pins_of(f"{owner}_{i + 1}"))
     return Account(
-        sections=tuple(_section(scene, i) for i in numbers),
-        joints=tuple(_joint(scene, i) for i in numbers),
-        pins=tuple(pin for i in numbers for owner in ("cylinder", "joint") for pin in scene.pins_of(f"{owner}_{i + 1}")),
-        payload=scene.payload,
-        base=scene.base,
-        left_out=left_out(scene),
+        scene,
+        tuple(_section(scene, i) for i in numbers),
+        tuple(_joint(scene, i) for i in numbers),
+        tuple(pins),
+        left_out(scene),
     )
+
+
+def _fill_mass(scene: Scene, section: Section) -> float:
+    return (scene.line_fill or 0.0) * section.length
 
 
 def _section(scene: Scene, i: int) -> SectionAccount:
-    section = scene.sections[i]
-    parts = flexible_parts(scene, i)
-    bending = scene.modes_of(i) if parts else 0
-    axial = int(bool(parts) and scene.has_axial(i))
-    beam = section.beam or (0.0, 0.0)
-    return SectionAccount(
-        number=i + 1,
-        length=section.length,
-        has_beam=section.beam is not None,
-        parts=parts,
-        splits=splits(scene, i),
-        bending=bending,
-        axial=axial,
-        beam_mass=(section.rho_A or 0.0) * (beam[1] - beam[0]),
-        root_mass=section.root.mass if section.root is not None else 0.0,
-        head_mass=section.head.mass if section.head is not None else 0.0,
-        fill_mass=(scene.line_fill or 0.0) * section.length,
-        unknowns=len(parts) * (bending + axial),
-    )
+    section, parts = scene.sections[i], flexible_parts(scene, i)
+    bending, axial = scene.modes_of(i) if parts else 0, int(bool(parts) and scene.has_axial(i))
+    return SectionAccount(i + 1, section, parts, splits(scene, i), bending, axial, _fill_mass(scene, section))
 
 
 def _joint(scene: Scene, i: int) -> JointAccount:
     joint = scene.joints[i]
-    cylinder = joint.cylinder
     low, high = stroke_range(scene, i, RANGE_SAMPLES)
-    return JointAccount(
-        number=i + 1,
-        kind=joint.kind,
-        range_deg=joint.range_deg,
-        stroke_low=low,
-        stroke_high=high,
-        max_stroke=cylinder.max_stroke,
-        k=cylinder.k,
-        k_over_stroke=() if cylinder.oil is None else stiffness_over_stroke(cylinder),
-        d=cylinder.d,
-        side="" if joint.kind == "A" else joint.side or "left",
-        linkage=linkage_account(scene, i),
-        link_mass=(joint.mL or 0.0) + (joint.mR or 0.0),
-        barrel_mass=cylinder.barrel.mass if cylinder.barrel is not None else 0.0,
-        rod_mass=cylinder.rod.mass if cylinder.rod is not None else 0.0,
-        unknowns=UNKNOWNS_A if joint.kind == "A" else UNKNOWNS_B,
-    )
+    oil = () if joint.cylinder.oil is None else stiffness_over_stroke(joint.cylinder)
+    return JointAccount(i + 1, joint, low, high, oil, linkage_account(scene, i))

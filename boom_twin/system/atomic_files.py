@@ -12,11 +12,9 @@ from tempfile import mkstemp
 
 from ..errors import BagError, UsageError
 
-DRAFT = ".draft"
-"""Suffix of a file that is being written; its name begins with a dot. A killed process may leave one."""
+DRAFT = ".draft"  # suffix of a file that is being written; its name begins with a dot; a killed process may leave one
 
-HEAD = 4096
-"""Number of first bytes of a file that identify an earlier result."""
+HEAD = 4096  # number of first bytes of a file that identify an earlier result
 
 _RECORDINGS = frozenset({".mcap", ".db3", ".bag"})
 _BESIDE_THEM = frozenset({"metadata.yaml", "session.yaml", "truth.csv.gz"})
@@ -26,23 +24,11 @@ os.umask(_umask)
 
 
 def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] = os.fsync) -> None:
-    """Write a file as a temporary one beside it, which is synced to the disk and then renamed.
+    """Write a file as a temporary one beside it, which is synced to the disk and then renamed; BagError if it cannot be.
 
-    `path` has the old content or the new one at any time, also after a kill or the loss of power. A path that is no
-    regular file (``/dev/stdout``, a pipe) is written to directly. The target of a symbolic link is replaced.
-
-    Parameters
-    ----------
-    path : Path
-    content : str or bytes
-        Text is encoded as UTF-8; surrogates in it (bytes of a path) become escapes.
-    sync : callable, optional
-        Syncs the file with the given descriptor to the disk.
-
-    Raises
-    ------
-    BagError
-        The file cannot be written; `path` is then unchanged.
+    `path` has the old content or the new one at any time, also after a kill or the loss of power. A path that is no regular
+    file (``/dev/stdout``, a pipe) is written to directly. The target of a symbolic link is replaced. Text is encoded as UTF-8,
+    its surrogates (bytes of a path) as escapes. `sync` syncs the file with a descriptor to the disk.
     """
     data = content.encode(errors="backslashreplace") if isinstance(content, str) else content
     try:
@@ -60,22 +46,11 @@ def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] =
 
 
 def check_target(path: Path, sources: Sequence[Path], own: bytes | Callable[[bytes], bool] | None = None) -> None:
-    """Refuse to replace a source, a file of a recording, or a file that another program wrote. Call it before the work.
+    """Raise UsageError if a write would replace a source, a file of a recording, or another program's.
 
-    Parameters
-    ----------
-    path : Path
-        File to be written. The target of a symbolic link is checked, because `write_atomic` replaces it.
-    sources : sequence of Path
-        Files that are read.
-    own : bytes or callable, optional
-        First bytes of an earlier result of the same command, which may be replaced; or a function that returns True for
-        the first `HEAD` bytes of one. None: any file may be replaced.
-
-    Raises
-    ------
-    UsageError
-        The file must not be replaced; the message names it.
+    To be called before the work. The target of a symbolic link is checked, because `write_atomic` replaces it. `own` are the
+    first bytes of an earlier result of the same command, or a function that returns True for the first `HEAD` bytes of one;
+    None: any file may be replaced.
     """
     for source in sources:
         if path.resolve() == source.resolve() or (path.exists() and source.exists() and path.samefile(source)):
@@ -136,5 +111,4 @@ def _replace(path: Path, data: bytes, sync: Callable[[int], None]) -> None:
 
 
 def _mode(path: Path) -> int:
-    """Return the permissions of the file that is replaced, or those of a new one."""
     return stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask

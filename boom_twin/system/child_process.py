@@ -14,8 +14,7 @@ from typing import Any
 
 from .cores import usable_cores
 
-ROOT = Path(__file__).absolute().parents[2]
-"""Folder or zip archive from which this process imported ``boom_twin``."""
+ROOT = Path(__file__).absolute().parents[2]  # folder or zip archive from which this process imported ``boom_twin``
 
 _START = (
     "import runpy, sys; from importlib import machinery, util; "
@@ -28,16 +27,9 @@ _START = (
 def python_command(module: str, *arguments: str) -> list[str]:
     """Return the command line that runs `module` of this package as ``python -m``, without the working directory's modules.
 
-    ``python -m`` puts the working directory first on ``sys.path``, so that a ``numpy.py`` beside a received session would
-    run; ``-P`` keeps it away. Environment and working directory are the parent's, so relative paths mean the same. The
-    package is taken from where the parent has it, also where the parent alone knows that place (a changed ``sys.path``).
-
-    Parameters
-    ----------
-    module : str
-        Full name, such as ``boom_twin.cli.main``.
-    *arguments : str
-        Arguments of the module.
+    ``python -m`` puts the working directory first on ``sys.path``, so that a ``numpy.py`` beside a received session would run;
+    ``-P`` keeps it away. Environment and working directory are the parent's, so relative paths mean the same. The package is
+    taken from where the parent has it, also where the parent alone knows that place (a changed ``sys.path``).
     """
     return [sys.executable, "-P", "-c", _START, str(ROOT), module, *arguments]
 

@@ -16,8 +16,8 @@ import numpy as np
 from ..errors import BoomTwinError
 from ..types import Array
 
-LONGEST_LINE = 2**16
-"""Limit for the number of characters in a line."""
+TOGETHER = 4096  # rows in memory
+LONGEST_LINE = 2**16  # limit for the number of characters in a line
 
 NOTHING = {"", "-", "nan", "null", "none", "na", "n/a", "#n/a"}
 """Texts of cells without a value, in lower case."""
@@ -31,16 +31,11 @@ class CsvTable:
     """Cells of a CSV file below its header, or of some of its rows."""
 
     path: Path
-    names: list[str]
-    """Names of the columns, from the header."""
-    rows: list[list[str]]
-    """The cells; empty lines are left out."""
-    lines: list[int]
-    """Line number of each row in the file, from 1."""
-    error: type[BoomTwinError]
-    """Type of the errors that are raised."""
-    is_ended: bool = True
-    """False if the last row is the last of the file, and has no line end."""
+    names: list[str]  # names of the columns, from the header
+    rows: list[list[str]]  # the cells; empty lines are left out
+    lines: list[int]  # line number of each row in the file, from 1
+    error: type[BoomTwinError]  # type of the errors that are raised
+    is_ended: bool = True  # False if the last row is the last of the file, and has no line end
 
     def column(self, name: str, blank: float | None = None) -> list[float]:
         """Return the numbers of a column, with `blank` for an empty cell. Without `blank`, an empty cell raises `error`."""
@@ -87,17 +82,11 @@ def read_csv(path: Path, error: type[BoomTwinError]) -> CsvTable:
     return CsvTable(path, pieces[0].names, rows, lines, error)
 
 
-def read_csv_pieces(
-    path: Path, error: type[BoomTwinError], together: int = 4096, layout: CsvLayout | None = None
-) -> Iterator[CsvTable]:
-    """Yield the table in a file, up to `together` rows at a time, so that a file of any size takes little memory.
+def read_csv_pieces(path: Path, error: type[BoomTwinError], layout: CsvLayout | None = None) -> Iterator[CsvTable]:
+    """Yield the table in a file, up to `TOGETHER` rows at a time, so that a file of any size takes little memory.
 
-    Without a `layout` the names are in the first line, and columns are separated by commas.
-
-    Raises
-    ------
-    BoomTwinError
-        The type `error`: the file cannot be read, a line is longer than `LONGEST_LINE`, or there is no row below the header.
+    Without a `layout` the names are in the first line, and columns are separated by commas. Raise `error` if the file cannot
+    be read, a line is longer than `LONGEST_LINE`, or there is no row below the header.
     """
     try:
         encoding = layout.encoding if layout else marked_encoding(path) or "utf-8"
@@ -111,11 +100,11 @@ def read_csv_pieces(
             else:
                 names, first = layout.names, layout.first_line
                 found = ((line, row) for line, row in found if line >= first)
-            some = list(islice(found, together))
+            some = list(islice(found, TOGETHER))
             if names and not some:
                 raise error(f"{path}: no rows below the header. Give at least one.")
             yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error, lines.is_ended)
-            while some := list(islice(found, together)):
+            while some := list(islice(found, TOGETHER)):
                 yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error, lines.is_ended)
     except UnicodeError as reason:
         raise error(f"{path}: its encoding cannot be read ({reason}). Save it as UTF-8.") from None

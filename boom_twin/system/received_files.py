@@ -35,13 +35,7 @@ def real_path(path: Path) -> Path:
 
 
 def holds_file(path: Path) -> bool:
-    """Return True if `open_received` can open a file at `path`; False if nothing is there.
-
-    Raises
-    ------
-    BagError
-        The path is no regular file: a link, a directory, a pipe, a socket, a device.
-    """
+    """Return True if `open_received` can open a file at `path`; False if nothing is there; BagError for no regular file."""
     try:
         mode = path.lstat().st_mode
     except (FileNotFoundError, NotADirectoryError):
@@ -53,15 +47,7 @@ def holds_file(path: Path) -> bool:
 
 
 def open_received(path: Path) -> BufferedReader:
-    """Open a file of a received folder for reading.
-
-    Raises
-    ------
-    BagError
-        The path is no regular file: a link, a directory, a pipe, a socket, a device.
-    OSError
-        The file is missing or cannot be read.
-    """
+    """Open a file of a received folder for reading; BagError for a link, directory, pipe, socket or device."""
     if not holds_file(path):
         raise FileNotFoundError(ENOENT, os.strerror(ENOENT), str(path))
     with ExitStack() as stack:

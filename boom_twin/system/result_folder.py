@@ -25,8 +25,7 @@ from .atomic_files import DRAFT, sync_folder, write_atomic
 from .received_files import real_path, sha256_of
 
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
-BUILDING, REPLACED = ".unfinished", ".replaced"
-"""Suffixes of the folders beside the result."""
+BUILDING, REPLACED = ".unfinished", ".replaced"  # suffixes of the folders beside the result
 OF_THE_SYSTEM = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})  # a file manager leaves them in a folder
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Errors of a full disk, a full quota, or a file at its size limit. Errors of writing name no file."""
@@ -38,8 +37,7 @@ class ResultKind:
     """Kind of result: the command and the files that it writes."""
 
     command: str
-    files: tuple[str, ...]
-    """Patterns for the paths of its files in the folder."""
+    files: tuple[str, ...]  # patterns for the paths of its files in the folder
     is_replaced: bool
     """True if a later run replaces the result. If not, it is a recording, which has no manifest and is never replaced."""
 
@@ -77,36 +75,13 @@ def study(kind: str) -> ResultKind:
     return ResultKind(f"study {kind}", (f"{kind}.json", f"{kind}.md", f"{kind}*.png"), is_replaced=True)
 
 
-@dataclass(frozen=True, slots=True)
-class UnfinishedResult:
-    """A result that is being built: its folder."""
-
-    folder: Path
-
-    def inner(self, name: str) -> UnfinishedResult:
-        """Return a new folder in it, for a part of the result."""
-        (self.folder / name).mkdir()
-        return UnfinishedResult(self.folder / name)
-
-
 @contextmanager
-def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Iterator[UnfinishedResult]:
+def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Iterator[Path]:
     """Build a folder of results, which is renamed to `out` if the block ends without an exception.
 
-    After an exception the new folder is removed, and `out` is unchanged.
-
-    Parameters
-    ----------
-    out : Path
-        Folder that is missing, empty, or an earlier result of the same command.
-    kind : ResultKind
-    sources : sequence of Path
-        Files and folders that the command reads. None may lie in `out`, nor `out` in a session.
-
-    Raises
-    ------
-    BagError
-        `out` holds anything else, another command is at work on it, or it cannot be written.
+    After an exception the new folder is removed, and `out` is unchanged. `out` is missing, empty, or an earlier result of the
+    same command. None of the `sources` that the command reads may lie in it, nor it in a session. BagError if `out` holds
+    anything else, another command is at work on it, or it cannot be written.
     """
     place = real_path(out)
     check_lasting(out)
@@ -129,7 +104,7 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
             _check_earlier(place, kind)
             _discard(replaced)
             _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
-            yield UnfinishedResult(building)
+            yield building
             _complete(building, kind)
         except BaseException as error:
             with suppress(OSError):
@@ -149,13 +124,7 @@ def is_unfinished(folder: Path) -> bool:
 
 
 def check_lasting(out: Path) -> None:
-    """Refuse a place inside an unfinished result, because the next run of its command would remove files there.
-
-    Raises
-    ------
-    BagError
-        The place lies in an unfinished result.
-    """
+    """Raise BagError for a place inside an unfinished result: the next run of its command would remove files there."""
     place = real_path(out)
     if (found := next(filter(is_unfinished, (place, *place.parents)), None)) is not None:
         told = f"lies in an unfinished result, which its command removes when it runs again ({found / UNFINISHED})"
@@ -190,7 +159,6 @@ def _identity(path: Path) -> tuple[int, int]:
 
 
 def _check_earlier(folder: Path, kind: ResultKind) -> None:
-    """Refuse a folder unless it is empty or an unchanged result of the same command."""
     if folder.exists() and not folder.is_dir():
         raise BagError(f"{folder}: is no folder. Choose another name.")
     entries = _entries(folder)
@@ -198,10 +166,10 @@ def _check_earlier(folder: Path, kind: ResultKind) -> None:
         return
     if not kind.is_replaced:
         raise BagError(f"{folder}: holds {entries[0]} already, and nothing is written over. Choose a new folder.")
-    remedy = f"Choose a new folder, or move it away: only an earlier {kind.command} is replaced, and as it was written"
+    remedy = "Choose a new folder, or move it away: only an earlier result of this command is replaced, as it was written"
     command, listed = _manifest(folder)
     if command != kind.command or listed is None:
-        raise BagError(f"{folder}: holds {entries[0]}, and no manifest of a {kind.command} (0.1.0 wrote none). {remedy}.")
+        raise BagError(f"{folder}: holds {entries[0]}, and no manifest of `boom_twin {kind.command}`. {remedy}.")
     own = {name for name in listed if kind.has(name)}  # a manifest may come with a recording, and say anything
     folders = set(_folders(*own))
     for name in entries:
@@ -242,7 +210,6 @@ def _note(path: Path) -> tuple[str, dict[str, str] | None]:
 
 @contextmanager
 def _locked(building: Path, kind: ResultKind) -> Iterator[int]:
-    """Make the folder to build in, and lock its marker."""
     marker = building / UNFINISHED
     try:
         building.parent.mkdir(parents=True, exist_ok=True)
@@ -278,16 +245,15 @@ def _check_left(building: Path, kind: ResultKind) -> None:
     entries = _entries(building)
     remedy = "Move it away, or choose another folder: results are built there"
     if entries and entries != [UNFINISHED] and _note(building / UNFINISHED)[0] != kind.command:
-        raise BagError(f"{building}: holds {entries[0]}, and no unfinished {kind.command} left it. {remedy}.")
+        raise BagError(f"{building}: holds {entries[0]}, and no `boom_twin {kind.command}` left it. {remedy}.")
     for name in entries:
         if not (kind.has(name) or name in (*_folders(*kind.files), MANIFEST, UNFINISHED)):
             raise BagError(f"{building}: holds {name}, which {kind.command} does not write. {remedy}.")
     if not kind.is_replaced and MANIFEST in entries:
-        raise BagError(f"{building}: holds a whole result of an earlier {kind.command}. Rename it, or choose another folder.")
+        raise BagError(f"{building}: holds a whole result of `boom_twin {kind.command}`. Rename it, or choose another folder.")
 
 
 def _remove(folder: Path, names: Sequence[str]) -> None:
-    """Remove files by name, then the folders inside that are empty."""
     for name in names:
         (folder / name).unlink(missing_ok=True)
     for inner in reversed([name for name in _entries(folder) if name.endswith("/")]):
@@ -295,7 +261,6 @@ def _remove(folder: Path, names: Sequence[str]) -> None:
 
 
 def _remove_empty(folder: Path) -> None:
-    """Remove a folder that holds only files of the system."""
     with suppress(OSError):
         if not _entries(folder):
             for name in OF_THE_SYSTEM:
@@ -304,7 +269,6 @@ def _remove_empty(folder: Path) -> None:
 
 
 def _complete(building: Path, kind: ResultKind) -> None:
-    """Sync all files to the disk, then list them in the manifest."""
     files = [name for name in _entries(building) if not name.endswith("/") and name != UNFINISHED]
     for name in files:
         if not kind.has(name):
@@ -331,7 +295,6 @@ def _discard(folder: Path) -> None:
 
 
 def _put_in_place(out: Path, place: Path, building: Path, replaced: Path, kind: ResultKind) -> None:
-    """Rename a whole result to its place."""
     try:
         _check_earlier(place, kind)  # again: somebody may have put something there meanwhile
         if place.exists():

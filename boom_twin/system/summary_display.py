@@ -37,13 +37,7 @@ def numbers(values: Any, factor: float = 1.0, digits: int = 4) -> str:
 
 
 def data_frame(columns: Mapping[str, Any]) -> Any:
-    """Return the columns as a ``pandas.DataFrame``.
-
-    Raises
-    ------
-    UsageError
-        pandas is not installed.
-    """
+    """Return the columns as a ``pandas.DataFrame``; UsageError if pandas is not installed."""
     try:
         from pandas import DataFrame
     except ImportError as error:

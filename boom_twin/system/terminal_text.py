@@ -28,15 +28,9 @@ def open_closed_streams() -> None:
 
 
 class PrintableStream:
-    """Wrapper of a text `stream` that escapes all written text by `printable`.
+    """Wrapper of a text `stream` that escapes all written text by `printable`; `name` is that in the OSError of a failed write.
 
-    If the reader of a pipe has ended, text is dropped and the command continues. Its exit code still gives the result.
-
-    Parameters
-    ----------
-    stream : TextIO
-    name : str
-        Name in the OSError of a failed write. If it is empty, failed writes are dropped without an error.
+    If the reader of a pipe has ended, or the name is empty, text is dropped and the command continues.
     """
 
     def __init__(self, stream: TextIO, name: str) -> None:

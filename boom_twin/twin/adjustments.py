@@ -12,25 +12,13 @@ from ..errors import UsageError
 from ..types import SECOND, SENSORS, Array, Change, Stream
 from .blocks import CODES
 from .loaded_model import LoadedModel
-from .state import COUNT, FIRST, NONE, RECENT, ZEROS, Ring, TwinState, zeros_at
+from .state import COUNT, FIRST, NONE, ZEROS, Ring, TwinState, zeros_at
 
 
 class SensorZeros:
-    """Zeros of all sensors, each set with the stamp from which it holds.
+    """Zeros of all sensors, each set with the stamp from which it holds; `values` are the newest by channel (m, rad, m/s^2, N).
 
-    Parameters
-    ----------
-    state : TwinState
-        Where they are kept; samples of stamps before the newest ones have those that held then.
-    channels : dict of Stream to tuple of str
-        See `boom_twin.types.channels_of`.
-    drive : Stream
-        The one that drives the model.
-
-    Attributes
-    ----------
-    values : dict of str to float
-        The newest ones, by channel: m, rad, m/s^2, N.
+    They are kept in `state`. Samples of stamps before the newest ones have those that held then.
     """
 
     def __init__(self, state: TwinState, channels: Mapping[Stream, tuple[str, ...]], drive: Stream) -> None:
@@ -71,15 +59,7 @@ WHOLE = {kind.stem: kind.channels(0) for kind in SENSORS.values() if kind.ends a
 
 
 class ResidualBuffer:
-    """Residuals as measured minus predicted, without any zero, in the order in which they became known.
-
-    Parameters
-    ----------
-    recent : Ring
-        Of `boom_twin.twin.state.TwinState`, which the update fills.
-    channels : dict of Stream to tuple of str
-        See `boom_twin.types.channels_of`.
-    """
+    """Residuals as measured minus predicted, without any zero, in the order in which they became known."""
 
     def __init__(self, recent: Ring, channels: Mapping[Stream, tuple[str, ...]]) -> None:
         self._recent = recent
@@ -90,23 +70,10 @@ class ResidualBuffer:
         self._recent.bounds[:] = 0
 
     def zeros_of(self, sensor: str, now: int, zeros: Mapping[str, float], slope: Callable[[int], float]) -> dict[str, float]:
-        """Return the zeros of a sensor, by channel, estimated from the second before `now` (ns).
+        """Return the zeros of a sensor, by channel, estimated from the second before `now` (ns); see `Twin.rezero`.
 
-        Parameters
-        ----------
-        sensor : str
-            ``joint_i`` (rad), ``tip_imu`` (m/s^2, both axes), ``cylinder_force_i`` (N), or ``cylinder_i`` (m): the zero that
-            explains the residual of ``joint_i``.
-        now : int
-        zeros : dict of str to float
-            Those that hold.
-        slope : callable
-            Stroke over angle (m/rad) of joint i, counted from 0.
-
-        Raises
-        ------
-        UsageError
-            It has too few readings in that time.
+        `zeros` are those that hold; `slope` gives stroke over angle (m/rad) of joint i, counted from 0. UsageError if it has
+        too few readings in that time.
         """
         if sensor in WHOLE:
             return {name: self._mean(name, now) for name in WHOLE[sensor]}
@@ -120,7 +87,7 @@ class ResidualBuffer:
     def _mean(self, channel: str, now: int) -> float:
         own, place = self._places[channel]
         recent, count = self._recent, self._recent.bounds[COUNT]
-        rows = (self._recent.bounds[FIRST] + np.arange(count)) % RECENT
+        rows = (self._recent.bounds[FIRST] + np.arange(count)) % len(recent.stamps)
         rows = rows[(recent.streams[rows] == own) & (recent.stamps[rows] > now - SECOND)]
         values = [value for value in recent.values[rows, place].tolist() if math.isfinite(value)]
         if len(values) < FEWEST_RESIDUALS:
@@ -130,21 +97,10 @@ class ResidualBuffer:
 
 
 class Requests:
-    """Collector of the changes requested between two stroke samples.
+    """Collector of the changes requested between two stroke samples; `due` if anything waits.
 
-    Attributes
-    ----------
-    settings : Settings
-    zeros : dict of str to float
-        As they will be.
-    from_rest : bool
-        Whether a start from rest is asked for.
-    is_new : bool
-        Whether a twin is asked for that knows nothing of the samples before.
-    due : bool
-        Whether anything waits.
-    model : LoadedModel or None
-        Of `settings`, if it was made beforehand.
+    `settings` and `zeros` are as they will be, `model` that of these settings if it was made in advance. `from_rest` asks for
+    a start from rest, `is_new` for a twin that knows nothing of the samples before.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -154,13 +110,7 @@ class Requests:
         self.model: LoadedModel | None = None
 
     def tune(self, live: Mapping[str, float], model: LoadedModel | None = None) -> None:
-        """Request new live settings; their `model` may have been made in advance, see `ModelPreparation`.
-
-        Raises
-        ------
-        UsageError
-            A value is out of bounds, or cannot change while the twin runs.
-        """
+        """Request new live settings; UsageError if a value is out of bounds or cannot change while the twin runs."""
         self.settings, self.model, self.due = self.settings.tuned(live), model, True
 
     def zero(self, values: Mapping[str, float]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any
@@ -11,65 +11,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.doubts import VALID_DEFLECTION
-from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor, Drawn
 from ..health.blocks import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
 from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..predictions import Outline
-from ..scene.schema import Scene
-from ..types import GIVE, NANO, SECOND, SENSORS, Array, Health, Report, Residuals, Stream, StrokeReading
+from ..types import Health, Report, Residuals, Stream
 from .blocks import CODES, STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
 from .load_shedding import LoadShedding
-from .regular import NOISE_REACH
 from .run import Run
-from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
-from .update import DONE, LOOK, ODD, measure, update
-
-CAPACITY = 4096  # samples that one call of the compiled update takes at most
-
-
-SWAY = 0.5  # rad, by which an inclinometer that drives the model may be off its estimate at once while its section shakes
-
-
-def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Collection[str], reads: StrokeReading) -> Limits:
-    """Return the limits of the compiled update for `boom`, that of `scene` with its load, and for its sensors."""
-    channels = list(boom.channels.values())
-    counts = np.array([len(names) for names in channels])
-    far = NOISE_REACH * settings.variance(SENSORS[reads.stream]) ** 0.5
-    low, high = np.zeros(boom.plan.joints), np.array([joint.cylinder.max_stroke for joint in scene.joints])
-    absolute = boom.posture.absolute
-    if reads is StrokeReading.ANGLE:
-        far += SWAY * boom.posture.sways.any()
-        low, high = np.radians([joint.range_deg for joint in scene.joints]).T
-        low, high = np.where(absolute, -np.inf, low - GIVE), np.where(absolute, np.inf, high + GIVE)
-        counts[CODES[Stream.STROKES]] = 0
-    return Limits(
-        gap=round(settings.gap * SECOND),
-        leap=settings.leap / NANO,
-        drive=CODES[reads.stream],
-        far=far,
-        rate=settings.rate(reads),
-        shortest=low - far,
-        longest=high + far,
-        turns=absolute & (reads is StrokeReading.ANGLE),
-        valid=VALID_DEFLECTION * scene.reach,
-        gravity=np.array(boom.plan.tables.gravity),
-        absolute=absolute,
-        absent=np.array([name in absent for names in channels[1:] for name in names]),
-        first=np.concatenate([[0], np.cumsum(counts[1:]) - counts[1:]]),
-        channels=counts,
-    )
+from .state import BEGINS_SLOT, IS_DEFLECTED, ROOM, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
+from .update import DONE, LOOK, update
 
 
 @dataclass
 class _UpdateExtras:
-    """Results of one call of the compiled update that are not numbers.
-
-    `drawn` (the source of outlines) is keyed by row of a prediction; `health` and `events` are keyed by row of a sample.
-    """
+    """Results of one call that are not numbers: `drawn` by row of a prediction, `health` and `events` by row of a sample."""
 
     drawn: dict[int, Drawn] = field(default_factory=dict)
     health: dict[int, Health] = field(default_factory=dict)
@@ -77,29 +35,16 @@ class _UpdateExtras:
 
 
 NO_EXTRAS = _UpdateExtras()
-_Code = tuple[Callable[..., tuple[int, int]], Callable[..., bool]]
-"""`update` and `measure`, compiled for a scene's types."""
-_Held = tuple[_Code, tuple[tuple[Any, ...], tuple[Any, ...], Any]]
-"""Compiled code with its arguments (boom, limits, state) and output, see `boom_twin.kernels.jit.hold`."""
+_Code = Callable[..., tuple[int, int]]  # `update`, compiled for a scene's types
+_Held = tuple[_Code, tuple[Any, ...], Any]  # with boom, limits and state, and output, see `boom_twin.kernels.jit.hold`
 
 
 class BlockUpdate:
     """Driver of the compiled update, for regular samples.
 
-    Parameters
-    ----------
-    boom : BoomPredictor
-    limits : Limits
-    state : TwinState
-    channels : dict of Stream to tuple of str
-        See `boom_twin.types.channels_of`.
-    judge : HealthMonitor or None
-    counts : Counter
-        Of events; ``deflected`` and ``unmatched`` are counted here.
-    shedding : LoadShedding
-        Asked what is left out.
-    before : BlockUpdate, optional
-        Of the same scene under another load, whose arrays are taken over.
+    `channels`: see `boom_twin.types.channels_of`. ``deflected`` and ``unmatched`` are added to `counts`. `shedding` is asked
+    what is left out. One call takes at most `capacity` samples. `before`, of the same scene under another load, gives its
+    arrays.
     """
 
     def __init__(
@@ -111,6 +56,7 @@ class BlockUpdate:
         judge: HealthMonitor | None,
         counts: Counter[str],
         shedding: LoadShedding,
+        capacity: int = ROOM.samples,
         before: BlockUpdate | None = None,
     ) -> None:
         self._shedding, self._boom, self.limits, self._state, self._channels = shedding, boom, limits, state, channels
@@ -118,7 +64,7 @@ class BlockUpdate:
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
         drives = CODES[Stream.STROKES], limits.drive
         self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code not in drives]
-        sizes = 2 * CAPACITY, self._joints, boom.width, boom.stations, limits.channels
+        self._capacity, sizes = capacity, (2 * capacity, self._joints, boom.width, boom.stations, limits.channels)
         self._found: UpdateOutput = new_output(*sizes) if before is None else before._found
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
@@ -143,27 +89,14 @@ class BlockUpdate:
         self._told, self._due, self._begins_health = tuple(self._found.counts.tolist()), None, True
 
     def advance(self, run: Run | None, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
-        """Take samples of a block as long as they are regular; `reports` or `report` return the results.
+        """Take regular samples of a block of at most `capacity`; return why that ended, see `DONE`, and how many were taken.
 
-        Parameters
-        ----------
-        run : Run or None
-            The present one.
-        block : SampleBlock
-            At most `CAPACITY` samples; int64, int64 and float64 arrays without gaps.
-        trusted : bool
-            Whether its only sample was looked at before.
-
-        Returns
-        -------
-        reason, count : int
-            Why that ended, see `boom_twin.twin.update.DONE`, and how many samples were taken.
+        `run` is the present one. `trusted`: the only sample was looked at before. `reports` or `report` return the results.
         """
         self.judge()
         self.make_room()
         row, size = 0, len(block.stamps)
-        assert run is not None
-        (advance, _), (arguments, _, found) = self._held or self._hold()
+        advance, arguments, found = self._held or self._hold()
         while True:
             reason, row = advance(*arguments, *block, row, trusted, found)
             if reason != LOOK:
@@ -177,27 +110,6 @@ class BlockUpdate:
         self._count_unmatched()
         return reason, row
 
-    def measure(self, code: int, stamp: int, values: Array, trusted: bool) -> int:
-        """Take one measured sample without the boom; return `DONE`, or `ODD` with nothing done.
-
-        Parameters
-        ----------
-        code : int
-            Of its stream, see `boom_twin.twin.blocks.CODES`.
-        stamp : int
-            ns.
-        values : ndarray
-            float64 without gaps, all channels of the stream.
-        trusted : bool
-            Whether it was looked at before.
-        """
-        self.judge()
-        self.make_room()
-        (_, measure_one), (_, beside, found) = self._held or self._hold()
-        is_taken = measure_one(*beside, code, stamp, values, trusted, found)
-        self._count_unmatched()
-        return DONE if is_taken else ODD
-
     def _count_unmatched(self) -> None:
         if unmatched := int(self._state.clock[UNMATCHED]):
             self._told_counts["unmatched"] += unmatched
@@ -207,23 +119,21 @@ class BlockUpdate:
         """Look up the compiled code and prepare the arguments of every call; another load renews few of them."""
         self._kept = state, found = self._kept or (hold(self._state), hold(self._found))
         limits, (one, width) = hold(self._limits), (np.zeros(1, np.int64), int(self._limits.channels.max()))
-        block = one, one, np.zeros((1, width))
-        together, beside = (*self._boom.held, limits, state), (*self._boom.filters_held, limits, state)
+        arguments = *self._boom.held, limits, state
         if self._code is None:
-            advance = update.for_types_of(*together, *block, 0, False, found)
-            self._code = advance, measure.for_types_of(*beside, 0, 0, np.zeros(width), False, found)
-        self._held = self._code, (together, beside, found)
+            self._code = update.for_types_of(*arguments, one, one, np.zeros((1, width)), 0, False, found)
+        self._held = self._code, arguments, found
         return self._held
 
     def make_room(self) -> None:
         """Prepare the next call of the compiled update; pass pending rows to the health monitor when the buffer is full."""
         self._begin, self._news = tuple(self._found.counts.tolist()), NO_EXTRAS
-        if max(self._begin) > CAPACITY:
+        if max(self._begin) > self._capacity:
             self._tell_health()
             self._found.counts[:] = 0
             self._begin = self._told = 0, 0
 
-    def _look_around(self, run: Run, row: int) -> None:
+    def _look_around(self, run: Run | None, row: int) -> None:
         """Add the shape, event and health request of a prediction that begins a slot or is outside the model's validity."""
         clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
         if self._news is NO_EXTRAS:
@@ -250,8 +160,7 @@ class BlockUpdate:
     def judge(self) -> Health | None:
         """Judge the rig's health if the newest sample began a slot and was not judged yet; return it or None.
 
-        The report of that sample is complete without it, so a live node publishes the report first. The judgement comes before
-        the next sample.
+        A live node publishes the report of that sample first. The judgement comes before the next sample.
         """
         run, self._due = self._due, None
         if run is None or self._judge is None:
@@ -262,15 +171,11 @@ class BlockUpdate:
         return health
 
     def _take_judgement(self, row: int) -> None:
-        """Judge the rig's health, if that is due, and store it with sample `row`."""
         if (health := self.judge()) is not None:
             self._news.health[row] = health
 
     def _tell_health(self, end: float = inf) -> None:
-        """Pass the results since the last call to the health monitor, except the last ones from `end` (ns) on.
-
-        So the results of a slot are passed together.
-        """
+        """Pass the results since the last call to the health monitor, but those from `end` (ns) on."""
         found = self._found
         if self._judge is None:
             return
@@ -321,7 +226,6 @@ class BlockUpdate:
         )
 
     def _outlines(self) -> dict[int, Outline]:
-        """Return outlines by row of a prediction."""
         drawn = self._news.drawn
         return dict(zip(drawn, self._boom.outlines(list(drawn.values())), strict=True)) if drawn else {}
 
@@ -351,7 +255,6 @@ class BlockUpdate:
         return Report(stamp, True, prediction, residuals, tuple(events), health=health, estimate=estimate)
 
     def _residuals_in(self, row: int) -> Residuals:
-        """Return a copy of the residuals in one row of the results."""
         found, stream = self._found, STREAMS[int(self._found.residual_streams[row])]
         names = self._channels[stream]
         values, sigmas = (array[row, : len(names)].copy() for array in (found.values, found.sigmas))

@@ -1,6 +1,6 @@
 """Arrays for many samples at once: the samples, and the predictions, estimates and residuals that they caused.
 
-A block says the same as so many `Sample` or `Report`: the order of its rows is the order in which the samples were taken.
+The order of the rows is the order in which the samples were taken. Stamps are in ns.
 """
 
 from __future__ import annotations
@@ -23,44 +23,18 @@ CODES = {stream: code for code, stream in enumerate(STREAMS)}
 
 
 class SampleBlock(NamedTuple):
-    """Samples in the order in which they were taken.
+    """Samples in the order in which they were taken."""
 
-    Attributes
-    ----------
-    streams : ndarray of int64, shape (k,)
-        Of every sample, by `CODES`.
-    stamps : ndarray of int64, shape (k,)
-        Nanoseconds.
-    values : ndarray, shape (k, w)
-        See `Sample.values`; w is the largest number of channels of a stream, and behind a stream's own channels stands NaN.
-    """
-
-    streams: Integers
-    stamps: Integers
-    values: Array
+    streams: Integers  # (k,), by `CODES`
+    stamps: Integers  # (k,)
+    values: Array  # (k, w), see `Sample.values`; w is the largest number of channels of a stream, NaN behind a stream's own
 
 
 class PredictionBlock(NamedTuple):
-    """Predictions, one at every stroke sample that was followed; every field but the first and the last as in `Prediction`.
+    """Predictions, one at every stroke sample that was followed; fields without comment as in `Prediction`, with p rows."""
 
-    Attributes
-    ----------
-    at : ndarray of int64, shape (p,)
-        Row of the sample that caused it.
-    stamps : ndarray of int64, shape (p,)
-        Nanoseconds.
-    tip_position, tip_displacement, tip_velocity, tip_acceleration : ndarray, shape (p, 2)
-    tip_angle, tip_angular_velocity, tip_angular_acceleration : ndarray, shape (p,)
-    joints, strokes, cylinder_forces : ndarray, shape (p, n)
-    clearances : ndarray, shape (p, c, 4)
-        Without such pins c is 0.
-    moments : ndarray, shape (p, m)
-    outlines : dict of int to Outline
-        By row of this block, of those predictions that have one.
-    """
-
-    at: Integers
-    stamps: Integers
+    at: Integers  # (p,), row of the sample that caused it
+    stamps: Integers  # (p,)
     tip_position: Array
     tip_displacement: Array
     tip_velocity: Array
@@ -73,7 +47,7 @@ class PredictionBlock(NamedTuple):
     cylinder_forces: Array
     clearances: Array
     moments: Array
-    outlines: dict[int, Outline]
+    outlines: dict[int, Outline]  # by row of this block, of those predictions that have one
 
     def one(self, row: int) -> Prediction:
         """Return the prediction of a row; its arrays are views."""
@@ -109,15 +83,7 @@ class _Columns:
 
 
 class EstimateBlock:
-    """Estimates, one beside every prediction; every attribute but `stamps` and `rows` as in `Estimate`, shape (p, ..).
-
-    Attributes
-    ----------
-    stamps : ndarray of int64, shape (p,)
-        Nanoseconds.
-    rows : ndarray, shape (p, WIDTH)
-        See `boom_twin.deviation.estimate_row`.
-    """
+    """Estimates, one beside every prediction, in `rows` (p, WIDTH); see `boom_twin.deviation.estimate_row` and `Estimate`."""
 
     tip, velocity, acceleration = (_Columns(first, 3) for first in (row_at.TIP, row_at.VELOCITY, row_at.ACCELERATION))
     load = _Columns(row_at.FORCE, 2)
@@ -156,48 +122,27 @@ def row_of(estimate: Estimate) -> Array:
 
 
 class ResidualBlock(NamedTuple):
-    """Residuals, in the order in which they became known; see `Residuals`.
+    """Residuals, in the order in which they became known; see `Residuals`."""
 
-    Attributes
-    ----------
-    at : ndarray of int64, shape (r,)
-        Row of the sample by which it became known: its own, or the stroke sample that it waited for.
-    streams, stamps : ndarray of int64, shape (r,)
-        Stream by `CODES`; nanoseconds.
-    values, sigmas : ndarray, shape (r, w)
-        NaN behind a stream's own channels.
-    """
-
-    at: Integers
-    streams: Integers
-    stamps: Integers
-    values: Array
-    sigmas: Array
+    at: Integers  # (r,), row of the sample by which it became known: its own, or the stroke sample that it waited for
+    streams: Integers  # (r,), by `CODES`
+    stamps: Integers  # (r,)
+    values: Array  # (r, w), NaN behind a stream's own channels
+    sigmas: Array  # (r, w)
 
 
 class ReportBlock(NamedTuple):
     """Reports of accepted samples without events and changes, as arrays.
 
-    A bag holds, for each sample in turn, what its `Report` holds, in this order: the prediction (log time: the sample's stamp),
-    the residuals that became known, the health, the outline of the prediction.
-
-    Attributes
-    ----------
-    stamps : ndarray of int64, shape (k,)
-        Of all samples, nanoseconds.
-    predictions : PredictionBlock
-    estimates : EstimateBlock
-        Of the same rows.
-    residuals : ResidualBlock
-    health : dict of int to Health
-        By row of the sample.
+    A bag holds, for each sample in turn, what its `Report` holds, in this order: the prediction (log time: the sample's
+    stamp), the residuals that became known, the health, the outline of the prediction.
     """
 
-    stamps: Integers
+    stamps: Integers  # (k,), of all samples
     predictions: PredictionBlock
-    estimates: EstimateBlock
+    estimates: EstimateBlock  # beside the predictions
     residuals: ResidualBlock
-    health: dict[int, Health]
+    health: dict[int, Health]  # by row of the sample
 
     def reports(self, joints: int) -> list[Report]:
         """Return one report for every sample, of a boom with so many joints."""

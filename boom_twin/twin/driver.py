@@ -1,7 +1,6 @@
 """Loop that updates a twin with samples and changes, shared by live node, replay, live page and calibration.
 
-Predictions depend only on samples and on the changes between them. All users give both to the twin in their order, and differ
-only in their use of the reports. So a replay repeats the live node bit for bit.
+All give samples and the changes between them in their order, so a replay repeats the live node bit for bit.
 """
 
 from __future__ import annotations
@@ -34,21 +33,10 @@ def drive(twin: Twin, items: Iterable[Sample | Change | None], judged: bool = Tr
 
 
 def drive(twin: Twin, items: Iterable[Sample | Change | None], judged: bool = True) -> Iterator[Step | None]:
-    """Update `twin` with one sample for each step that the caller takes.
+    """Update `twin` with one sample for each step that the caller takes; for `judged` see `Twin.update`.
 
-    Parameters
-    ----------
-    twin : Twin
-    items : iterable of Sample, Change or None
-        None is a message without a usable value. A change is requested from the twin. It takes effect with the next full
-        stroke sample, as in the recording.
-    judged : bool
-        See `Twin.update`.
-
-    Yields
-    ------
-    Step or None
-        Step for each sample; None for a message without a usable value.
+    A change is requested from the twin. It takes effect with the next full stroke sample, as in the recording. None, a
+    message without a usable value, gives None.
     """
     for item in _repeating_changes(twin, items):
         yield None if item is None else drive_one(twin, item, judged)

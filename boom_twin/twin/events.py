@@ -1,5 +1,7 @@
 """Events of the twin: names of irregularities of a sample, as in `Report.events`."""
 
+from ..types import StrokeReading
+
 EVENTS = {
     "late": "stamp not after the newest one of its stream; sample left out",
     "duplicate": "stamp as the newest one of its stream, within 20 us; sample left out",
@@ -31,3 +33,10 @@ CONSEQUENCES = frozenset({"waiting", "model"})
 
 TOLD_AT_ONCE = frozenset({"restart", "stroke elsewhere", "clock set", "jump back", "reset", "load", "limits", "zero"})
 """Events that `Report.change` goes with."""
+
+
+def event_meaning(name: str, reads: StrokeReading) -> str:
+    """Return the meaning of an event where these readings drive the model; empty for an unknown event."""
+    told = EVENTS.get(name, "")
+    is_of_angles = reads is StrokeReading.ANGLE and name != "not used"
+    return told.replace("strokes", "angles").replace("a stroke", "an angle") if is_of_angles else told

@@ -11,12 +11,9 @@ SHAPES_ABOVE, HEALTH_ABOVE = 0.5, 0.75
 
 
 class LoadShedding:
-    """Decision, by the fill level of the sample queue, what to skip. A replay has no queue and skips nothing.
+    """Decision, by the fill level of the sample queue, what to skip; `shapes` and `health` count what was left out.
 
-    Attributes
-    ----------
-    shapes, health : int
-        Shapes, and looks at the rig's health, that were left out; there are ten of each in a second.
+    A replay has no queue and skips nothing.
     """
 
     def __init__(self) -> None:

@@ -14,14 +14,18 @@ from dataclasses import dataclass
 from threading import Thread
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..analysis.doubts import VALID_DEFLECTION
 from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
 from ..errors import BoomTwinError
 from ..health.monitor import HealthMonitor
 from ..scene.edit import loaded
 from ..scene.schema import Scene
-from ..types import Mount, Place, StrokeReading
-from .block_update import limits_of
+from ..types import GIVE, NANO, SECOND, SENSORS, Mount, Place, Stream, StrokeReading
+from .blocks import CODES
+from .regular import NOISE_REACH
 from .state import Limits
 
 if TYPE_CHECKING:
@@ -29,6 +33,39 @@ if TYPE_CHECKING:
 
 SWITCH = 5e-4
 """Most time (s) that a sample waits for the interpreter while a model is prepared in the other thread."""
+
+
+SWAY = 0.5  # rad, by which an inclinometer that drives the model may be off its estimate at once while its section shakes
+
+
+def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Collection[str], reads: StrokeReading) -> Limits:
+    """Return the limits of the compiled update for `boom`, that of `scene` with its load, and for its sensors."""
+    channels = list(boom.channels.values())
+    counts = np.array([len(names) for names in channels])
+    far = NOISE_REACH * settings.variance(SENSORS[reads.stream]) ** 0.5
+    low, high = np.zeros(boom.plan.joints), np.array([joint.cylinder.max_stroke for joint in scene.joints])
+    absolute = boom.posture.absolute
+    if reads is StrokeReading.ANGLE:
+        far += SWAY * boom.posture.sways.any()
+        low, high = np.radians([joint.range_deg for joint in scene.joints]).T
+        low, high = np.where(absolute, -np.inf, low - GIVE), np.where(absolute, np.inf, high + GIVE)
+        counts[CODES[Stream.STROKES]] = 0
+    return Limits(
+        gap=round(settings.gap * SECOND),
+        leap=settings.leap / NANO,
+        drive=CODES[reads.stream],
+        far=far,
+        rate=settings.rate(reads),
+        shortest=low - far,
+        longest=high + far,
+        turns=absolute & (reads is StrokeReading.ANGLE),
+        valid=VALID_DEFLECTION * scene.reach,
+        gravity=np.array(boom.plan.tables.gravity),
+        absolute=absolute,
+        absent=np.array([name in absent for names in channels[1:] for name in names]),
+        first=np.concatenate([[0], np.cumsum(counts[1:]) - counts[1:]]),
+        channels=counts,
+    )
 
 
 @dataclass(frozen=True)
@@ -49,22 +86,18 @@ def loaded_model(
     reads: StrokeReading,
     absent: Collection[str],
     places: Mapping[str, Place],
+    lagging: Collection[Stream],
 ) -> LoadedModel:
     """Return the model of `scene` under the load of `settings`; for the parameters see `boom_twin.Twin`."""
     scene = loaded(scene, *settings.load)
-    boom = BoomPredictor(scene, settings, mounts, reads, places)
+    boom = BoomPredictor(scene, settings, mounts, reads, places, lagging)
     judge = HealthMonitor(scene, settings, tuple(mounts), absent, boom.channels, reads, places) if health else None
     _ = boom.held  # made here, where no sample waits for it
     return LoadedModel(scene, limits_of(scene, boom, settings, absent, reads), boom, judge)
 
 
 class ModelPreparation:
-    """Preparation of the models that new live settings need, in a thread; requests the settings once the model is ready.
-
-    Parameters
-    ----------
-    twin : Twin
-    """
+    """Preparation of the models that new live settings need, in a thread; requests the settings once the model is ready."""
 
     def __init__(self, twin: Twin) -> None:
         self._twin = twin

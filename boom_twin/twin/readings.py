@@ -18,22 +18,11 @@ LARGEST = {Stream.STROKES: 20.0, Stream.ANGLES: 50.0, Stream.IMU: 1000.0}
 
 
 def samples_of(readings: Mapping[str, Any], stamp_ns: int | None, joints: int) -> list[Sample]:
-    """Return the samples of readings with one stamp, strokes first.
+    """Return the samples of readings at `stamp_ns`, strokes first; UsageError for names, values or a stamp that cannot be used.
 
-    Parameters
-    ----------
-    readings : mapping of str to float or sequence
-        A number by the name of a channel (``cylinder_1``, ``joint_2``, ``tip_imu_x``, ``cylinder_force_1``), or all of a stream
-        by its name (``cylinder_strokes``, ``joint_angles``, ``tip_imu``, ``cylinder_forces``). SI units; NaN without a reading.
-    stamp_ns : int
-        Time of the readings, ns.
-    joints : int
-        Number of joints of the boom.
-
-    Raises
-    ------
-    UsageError
-        A name is unknown, a value is no number, an array has another shape, or the stamp is not given.
+    A reading is a number by the name of a channel (``cylinder_1``, ``joint_2``, ``tip_imu_x``, ``cylinder_force_1``), or all
+    of a stream by its name (``cylinder_strokes``, ``joint_angles``, ``tip_imu``, ``cylinder_forces``). SI units; NaN without
+    a reading.
     """
     if stamp_ns is None:
         raise UsageError("stamp_ns is not given. Give the time of the readings in ns: stamp_ns=time.time_ns().")

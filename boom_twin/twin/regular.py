@@ -1,7 +1,7 @@
 """Rules of a regular sample, each once: on time, complete, within reach of the cylinders.
 
-The compiled update applies them to every sample; `boom_twin.twin.stamp_check` and `boom_twin.twin.stroke_check` apply them as
-Python to the samples of a twin that has irregular ones.
+The compiled update applies them to every sample; `boom_twin.twin.stamp_check` and `boom_twin.twin.run` apply them as Python to
+irregular samples.
 """
 
 from __future__ import annotations

@@ -1,13 +1,21 @@
-"""One run of the twin: from a start of the model at rest to the next one."""
+"""One run of the twin, from a start of the model at rest to the next one: its stamps, and its check of strokes."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..types import Array
-from .state import EPOCH, IN_SLOT, NEWEST, TwinState
-from .stroke_check import StrokeCheck
+from ..types import NANO, Array
+from .regular import reach_of_strokes
+from .state import CHECKED, EPOCH, IN_SLOT, NEWEST, OTHERS, TRUSTED, Limits, TwinState
 from .update import matched
+
+MOST_DOUBTED = 5  # implausible readings in a row, without a jump, that are left out; the next one is accepted
+SILENT_AFTER = 100_000_000  # ns after which a missing stroke is reported
+BELIEVED_AFTER = 1_000_000_000  # ns after which readings that stay where they jumped are accepted
+USUAL_RATE = 0.1  # share of the maximum rate; with twice the estimated rate it bounds the motion between jump and return
+NEVER = -1
+Flags = NDArray[np.bool_]
 
 
 class Run:
@@ -56,3 +64,95 @@ class Run:
         self._state.clock[EPOCH] += shift
         self._state.clock[NEWEST] += shift
         self._state.past.bounds[:] = 0
+
+
+class StrokeCheck:
+    """Check of strokes or angles that drive the model in one run, against the estimates (n,) at the sample before.
+
+    CHECKED, TRUSTED and OTHERS of `boom_twin.twin.state.TwinState.clock` are updated.
+    """
+
+    def __init__(self, clock: NDArray[np.int64]) -> None:
+        self._clock = clock
+        self._before = 0
+        self._jumped = np.zeros(0, np.int64)  # stamp (ns) of a stroke's jump; NEVER without one
+
+    def is_of_others(self, stamp: int, values: Array, estimate: Array, limits: Limits) -> bool:
+        """Return True if two or more strokes are out of reach of their cylinders, probably of another boom.
+
+        After `MOST_DOUBTED` such samples in a row the result is False.
+        """
+        limit = self._limit(stamp, limits)
+        if np.count_nonzero(_are_far(values, estimate, limit)) < 2:
+            self._clock[OTHERS] = 0
+            return False
+        self._clock[OTHERS] += 1
+        return bool(self._clock[OTHERS] <= MOST_DOUBTED)
+
+    def _limit(self, stamp: int, limits: Limits) -> float:
+        return float(reach_of_strokes(limits.far, limits.rate, stamp - int(self._clock[CHECKED])))
+
+    def of(
+        self, stamp: int, values: Array, before: Array, estimate: Array | None, rates: Array, limits: Limits
+    ) -> tuple[Array, list[str]]:
+        """Return the strokes (n,) for the model, NaN = missing, and events. See `must_restart` next.
+
+        `values` and those `before` are measured, m; `estimate` is None for the first sample of a run; `rates` (m/s) are
+        estimated at the sample before. `stamp` is in ns.
+        """
+        if estimate is None:
+            self._strange, self._seen = np.zeros(len(values), dtype=np.int64), np.full(len(values), stamp)
+            self._jumped = np.full(len(values), NEVER)
+            self._clock[CHECKED] = self._clock[TRUSTED] = stamp
+            return values, []
+        limit = self._limit(stamp, limits)
+        far = _are_far(values, estimate, limit)
+        self._clock[CHECKED] = stamp
+        if not far.any() and np.isfinite(values).all():
+            self._clock[TRUSTED] = stamp
+            return values, []
+        if self._clock[TRUSTED] > self._before:  # a regular sample came since the last irregular one
+            self._strange[:], self._seen[:], self._jumped[:] = 0, self._clock[TRUSTED], NEVER
+        self._before = stamp
+        step = values - before
+        jumps, is_onward = np.abs(step) > limit, step * (before - estimate) > 0.0
+        returned = jumps & (
+            np.abs(values - estimate) <= limit + self._gone(stamp, USUAL_RATE * limits.rate + 2.0 * np.abs(rates))
+        )
+        is_back = self._note_jumps(stamp, far, jumps, is_onward, returned)
+        return self._doubted(stamp, values, far & ~is_back)
+
+    @property
+    def must_restart(self) -> bool:
+        """Return True if a stroke stays where it jumped for `BELIEVED_AFTER`: no motion leads there."""
+        jumped = self._jumped != NEVER
+        return bool(jumped.any() and (self._before - self._jumped[jumped]).max() >= BELIEVED_AFTER)
+
+    def _gone(self, stamp: int, rates: Array) -> Array:
+        """Return the distance of each reading at these `rates` since its jump, shape (n,)."""
+        elapsed = np.where(self._jumped == NEVER, 0, stamp - self._jumped) * NANO
+        return np.asarray(rates * elapsed)
+
+    def _note_jumps(self, stamp: int, far: Flags, jumps: Flags, is_onward: Flags, returned: Flags) -> Flags:
+        """Note strokes that jumped; return those that jumped back. A second jump onward is motion, seen by a slow sensor."""
+        is_away = self._jumped != NEVER
+        is_back: Flags = is_away & returned
+        is_over = is_back | ~far | (is_away & jumps & is_onward)
+        self._jumped = np.where(is_over, NEVER, np.where(far & jumps, stamp, self._jumped))
+        return is_back
+
+    def _doubted(self, stamp: int, values: Array, far: Flags) -> tuple[Array, list[str]]:
+        self._strange = np.where(far, self._strange + 1, np.where(np.isnan(values), self._strange, 0))
+        implausible = far & ((self._strange <= MOST_DOUBTED) | (self._jumped != NEVER))
+        taken = np.where(implausible, np.nan, values)
+        self._strange[far & ~implausible] = 0
+        self._seen = np.where(np.isfinite(taken), stamp, self._seen)
+        silent = np.isnan(taken) & (stamp - self._seen > SILENT_AFTER)
+        events = ["implausible"] if implausible.any() else []
+        if silent.any():
+            events.append("held")
+        return taken, events
+
+
+def _are_far(values: Array, estimate: Array, limit: float) -> Flags:
+    return np.asarray(np.abs(values - estimate) > limit)

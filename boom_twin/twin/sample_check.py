@@ -8,7 +8,6 @@ from reprlib import repr as repr_of
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..types import Array, Sample, Stream
@@ -20,15 +19,7 @@ LARGEST_STAMP = 2**63  # ns
 
 
 class SampleCheck:
-    """Check of samples before the twin takes them.
-
-    Parameters
-    ----------
-    channels : dict of Stream to tuple of str
-        See `boom_twin.types.channels_of`.
-    drive : Stream
-        The one that drives the model.
-    """
+    """Check of samples before the twin takes them; `drive` is the stream that drives the model."""
 
     def __init__(self, channels: Mapping[Stream, tuple[str, ...]], drive: Stream) -> None:
         self._drive = drive
@@ -38,15 +29,7 @@ class SampleCheck:
         self.is_sure = False
 
     def checked(self, sample: Sample) -> Sample:
-        """Return the sample with an int stamp and contiguous float64 values, shape (channels,).
-
-        The sample is not copied if it has these types already.
-
-        Raises
-        ------
-        UsageError
-            See `boom_twin.twin.twin.Twin.update`.
-        """
+        """Return the sample with an int stamp and contiguous float64 values (channels,); UsageError as of `Twin.update`."""
         stream, stamp, values = sample.stream, sample.stamp, sample.values
         if (
             type(stamp) is int
@@ -64,13 +47,6 @@ class SampleCheck:
         if not self.is_sure and stream is self._drive:
             self._look(found.stamp)
         return found
-
-    def look_at(self, stamps: NDArray[np.int64]) -> None:
-        """Accept the stamps (ns) of strokes as nanoseconds before their block is taken, if they suffice to decide."""
-        deciding = stamps[: DECIDING - self._count]
-        if not self.is_sure and 0 < len(deciding) == DECIDING - self._count:
-            span = max(self._high, int(deciding.max())) - min(self._low, int(deciding.min()))
-            self.is_sure = span >= DECIDING * SHORTEST_STEP
 
     def _look(self, stamp: int) -> None:
         """Raise UsageError if the stamps are too close together to be nanoseconds.

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..config.settings import Settings
+from ..deviation.predictor import BoomPredictor
 from ..errors import BoomTwinError, SolverError
 from ..health.causes import Hypothesis
 from ..health.fault_twins import FaultTwins, Follower
@@ -33,21 +34,22 @@ from ..types import (
     streams_of,
 )
 from .adjustments import Requests, ResidualBuffer, SensorZeros
-from .block_update import BlockUpdate, limits_of
+from .block_update import BlockUpdate
 from .blocks import CODES, SampleBlock
 from .load_shedding import LoadShedding
-from .loaded_model import LoadedModel, loaded_model
+from .loaded_model import LoadedModel, limits_of, loaded_model
 from .regular import SHORTEST_STEP, near
 from .run import Run
 from .sample_check import SampleCheck
-from .stamp_check import StampCheck
-from .state import NEWEST, NONE, STATUS, UNMATCHED, drop_waiting, new_state
-from .time_steps import Action, TimeStep, verdict_on
+from .stamp_check import Action, StampCheck, TimeStep, verdict_on
+from .state import FOLLOWER_ROOM, NEWEST, NONE, ROOM, STATUS, UNMATCHED, Room, drop_waiting, new_state
 from .update import DONE, FAILED
 
 
 class SampleTaker:
     """State and model of a twin, and what single samples do to them; `boom_twin.twin.twin.Twin` is the public side."""
+
+    _boom: BoomPredictor
 
     def __init__(
         self,
@@ -61,21 +63,22 @@ class SampleTaker:
         causes: bool = False,
         is_live: bool = False,
         places: Mapping[str, Place] = NO_PLACES,
+        lagging: Collection[Stream] = (),
+        room: Room = ROOM,
     ) -> None:
-        self.reads, self.absent, scene = reads, frozenset(absent), as_scene(scene)
-        self._drive = reads.stream
+        self.reads, self._drive, self.absent, scene = reads, reads.stream, frozenset(absent), as_scene(scene)
         self.scene, self.settings, self._health = scene, settings or Settings(), health
         self.counts: Counter[str] = Counter()
         self.shedding = LoadShedding()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
-        self.places = dict(places)
+        self.places, self.lagging = dict(places), tuple(lagging)
         self._channels = channels_of(len(scene.joints), streams_of(self.places))
         self.absent |= {name for name in self._channels[Stream.MOMENTS] if name not in self.places}
         self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
         self._widths = [len(names) for names in self._channels.values()]
         self._edge = SampleCheck(self._channels, self._drive)
         self.requests = Requests(self.settings)
-        self._doubted = frozenset(doubted)
+        self._doubted, self._room = frozenset(doubted), room
         self._judged = True  # health, with the present sample
         self._fault_twins: FaultTwins | None = None
         if causes and health:
@@ -84,7 +87,7 @@ class SampleTaker:
 
     def _begin(self) -> None:
         """Reset state, model, estimate, health and zeros to those before the first sample."""
-        self._state = new_state(len(self.scene.joints), np.array(self._widths))
+        self._state = new_state(len(self.scene.joints), np.array(self._widths), self._room)
         self._state.clock[NEWEST] = NONE
         self._adopt(self._model(self.settings))
         self._run: Run | None = None
@@ -96,18 +99,17 @@ class SampleTaker:
 
     def _maker(self) -> Callable[[Hypothesis], Follower]:
         """Return a function that makes twins of booms with faults, with the settings as they are now."""
-        kind: Any = type(self)
-        settings = self.settings
+        kind, settings = cast(Any, type(self)), self.settings
 
         def make(each: Hypothesis) -> Follower:
             boom = each.scene, settings.tuned(each.load(*settings.load)), self.mounts
-            twin: Follower = kind(*boom, reads=self.reads, absent=self.absent, doubted=each.doubted, places=self.places)
+            sensors: Any = {"absent": self.absent, "doubted": each.doubted, "places": self.places, "lagging": self.lagging}
+            twin: Follower = kind(*boom, reads=self.reads, **sensors, room=FOLLOWER_ROOM)
             return twin
 
         return make
 
     def _failing(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return the measured channels and the strokes that health leaves out by now."""
         assert self.judge is not None
         return self.judge.suspected, self.judge.failing_strokes
 
@@ -116,7 +118,7 @@ class SampleTaker:
         self._boom.leave_out(masked, strokes)
 
     def _restart(self) -> None:
-        """Forget all samples; see `boom_twin.twin.twin.Twin.reset`."""
+        """Forget all samples."""
         self._begin_anew()
         self._lines = self._new_lines()
         self._state.waiting.bounds[:] = 0
@@ -126,10 +128,13 @@ class SampleTaker:
 
     def _model(self, settings: Settings) -> LoadedModel:
         self._former: BlockUpdate | None = None
-        return loaded_model(self.scene, settings, self.mounts, self._health, self.reads, self.absent, self.places)
+        placed = self.absent, self.places, self.lagging
+        return loaded_model(self.scene, settings, self.mounts, self._health, self.reads, *placed)
 
     def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
         """Use this model, which has the present load, in place of that of `before`."""
+        if before is not None:
+            model.boom.filters.lags[:] = self._boom.filters.lags
         self._boom, self.judge = model.boom, model.judge
         self._boom.doubt(self._doubted)
         if self.judge is not None:
@@ -137,8 +142,8 @@ class SampleTaker:
         self.plan = self._boom.plan
         parts = self._boom, model.limits, self._state, self._channels, self.judge
         self._former = before  # let go of when the next model is made, which may be in a thread of its own
-        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, before)
-        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, self.plan.joints)))  # of what drives
+        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, self._room.samples, before)
+        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, max(self._widths))))
 
     def _take_over(self, stamp: int) -> list[str]:
         """Apply the requested changes; return the events. Another load, or other zeros of strokes, need a start from rest."""
@@ -179,10 +184,8 @@ class SampleTaker:
 
     def _advance_one(self, sample: Sample, trusted: bool = False) -> int:
         """Take a sample if it is regular, or `trusted`; see `BlockUpdate.advance`."""
-        if sample.stream is not self._drive:
-            return self._compiled.measure(CODES[sample.stream], sample.stamp, sample.values, trusted)
         one = self._one
-        one.streams[0], one.stamps[0], one.values[0] = CODES[self._drive], sample.stamp, sample.values
+        one.streams[0], one.stamps[0], one.values[0, : len(sample.values)] = CODES[sample.stream], sample.stamp, sample.values
         reason, _ = self._compiled.advance(self._run, one, trusted)
         return reason
 
@@ -217,11 +220,10 @@ class SampleTaker:
             return self._follow(sample, values, complete, [])
         if verdict.action is Action.STEP:
             return self._step_in_time(run, line, verdict.why)
-        return (self._refuse if verdict.action is Action.REFUSE else self._hold)(sample, verdict.event)
+        return self._refuse(sample, verdict.event, held=verdict.action is Action.HOLD)
 
     def _step_in_time(self, run: Run, line: StampCheck, why: TimeStep) -> Report:
-        """Follow the samples that were held, now that the newest confirms them."""
-        held, usual = self._released(line), round(line.usual)
+        held, usual = line.release(self.counts), round(line.usual)
         span = held[0].stamp - run.newest
         events = ["gap"] if span * NANO > self.settings.gap else []
         if why is TimeStep.CLOCK:
@@ -239,21 +241,13 @@ class SampleTaker:
             events = []
         return replace(reports[-1], earlier=tuple(reports[:-1]))
 
-    def _released(self, line: StampCheck) -> list[Sample]:
-        """Return the held samples; events counted for those before the newest are uncounted."""
-        held = line.release()
-        self.counts.subtract(event for _, event in held[:-1])
-        for event in {event for _, event in held if not self.counts[event]}:
-            del self.counts[event]
-        return [sample for sample, _ in held]
-
     def _rebase(self, run: Run, shift: int) -> None:
         """Shift stamps by `shift` (ns) from now on; the model continues."""
         before = run.newest
         run.rebase(shift)
         self._boom.rebase(shift)
         for line in self._lines.values():
-            line.newest = None
+            line.forget()
         self._zeros.forget_past()
         self._recent.clear()
         if shift < 0:
@@ -304,7 +298,6 @@ class SampleTaker:
         return self._step(self._run, sample, events)
 
     def _step(self, run: Run, sample: Sample, events: list[str]) -> Report:
-        """Step the model to checked strokes, their values less the sensors' zeros."""
         self._lines[self._drive].take(sample.stamp)
         estimate = self._boom.extrapolated(0.0) if run.is_predicted else None
         before, rates, check = self._state.strokes, self._boom.speeds, run.plausible
@@ -321,7 +314,7 @@ class SampleTaker:
         return self._compiled.report(sample.stamp, events, self._judged)
 
     def _fail(self, sample: Sample, events: list[str]) -> Report:
-        """Return the report of a stroke sample at which the model failed; reset the model."""
+        """Reset the model, which failed at this stroke sample; return the report."""
         self._restart()
         self._failed = sample.stamp
         return self._refuse(sample, "model", *events, status=SENTENCES[int(self._state.clock[STATUS])])
@@ -338,8 +331,8 @@ class SampleTaker:
             return self._refuse(sample, "duplicate" if span == 0.0 else "late")
         event = line.hold(sample, "leap")
         if not line.is_confirmed():
-            return self._hold(sample, event)
-        held = self._released(line)
+            return self._refuse(sample, event, held=True)
+        held = line.release(self.counts)
         gone = drop_waiting(self._state, held[0].stamp, -NONE, CODES[sample.stream])  # their time comes again: a looped bag
         self._state.clock[UNMATCHED] += gone
         reports = [self._compare(each, self._is_complete(each)) for each in held]
@@ -356,14 +349,10 @@ class SampleTaker:
             return self._refuse(sample, "unmatched", *events)
         return self._compiled.report(sample.stamp, events)
 
-    def _hold(self, sample: Sample, event: str) -> Report:
-        """Count an event and return the report of a held sample; its values are not used for now."""
-        self.counts[event] += 1
-        return Report(sample.stamp, True, events=(event,))
-
-    def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
+    def _refuse(self, sample: Sample, *events: str, status: str = "ok", held: bool = False) -> Report:
+        """Return the report of a sample whose values are not used, or if `held` not used for now."""
         self.counts.update(events)
-        return Report(sample.stamp, False, events=events, status=status)
+        return Report(sample.stamp, held, events=events, status=status)
 
     def _is_complete(self, sample: Sample) -> bool:
         """Return True if no sensor's reading is missing, not finite or absurd."""

@@ -15,14 +15,27 @@ Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 NONE = -(2**62)  # no stamp yet, ns
-KEPT = 16_384  # most expected readings, of the last `SPAN`: 8 kHz
 WAITING = 4096  # most samples that wait for a stroke
-RECENT = 16_384  # differences that the zero of a sensor may be found from
 ZEROS = 16  # sets of zeros that late samples may still need
 SLOT = 100_000_000  # ns; the first prediction in each has an outline, and health is judged with it
 
 EPOCH, NEWEST, CHECKED, TRUSTED, OTHERS, IN_SLOT, UNMATCHED, STATUS, BEGINS_SLOT, IS_DEFLECTED = range(10)  # of `clock`
 FIRST, COUNT = range(2)  # of a ring
+
+
+class Room(NamedTuple):
+    """Rows of a twin's buffers.
+
+    expected : expected readings of the last `SPAN`. recent : residuals that the zero of a sensor may be found from. samples :
+    samples that one call of the compiled update takes at most.
+    """
+
+    expected: int = 16_384
+    recent: int = 16_384
+    samples: int = 4096
+
+
+ROOM, FOLLOWER_ROOM = Room(), Room(1024, 1, 1024)  # for 8 kHz of strokes; for samples at 50 Hz, without requests of a zero
 
 
 @by_reference
@@ -39,87 +52,60 @@ class Ring(NamedTuple):
 
 @by_reference
 class TwinState(NamedTuple):
-    """State of the twin between samples, beside the boom; s streams of up to w channels, c measured channels in all.
+    """State of the twin between samples, beside the boom; s streams of up to w channels, c measured channels in all."""
 
-    clock : (10,) whole numbers by the names above; stamps in ns, CHECKED and TRUSTED since EPOCH.
-    interval : (1,) running mean of the time between strokes, s; 0 while unknown.
-    newest : (s,) stamp of the newest sample of every stream, ns; NONE before the first.
-    usual : (s,) time from one sample to the next, ns; 0 while unknown.
-    held : (s,) samples that are held, see `boom_twin.twin.stamp_check`.
-    strokes, taken : (n,) newest strokes, or angles that drive the model, less their zeros, and as the model is to take them, m
-    or rad; NaN where missing.
-    past : expected readings (c,), their deviations and the strokes, of the last `SPAN`.
-    waiting : measured samples that wait for a stroke, by stamp and stream.
-    recent : measured less expected, without any zero.
-    zeros_since, zeros : (ZEROS,), (ZEROS, s, w) what sensors read too much from a stamp on. zero_sets : (1,) how many.
-    """
-
-    clock: Integers
-    interval: Array
-    newest: Integers
-    usual: Array
-    held: Integers
-    strokes: Array
-    taken: Array
-    past: Ring
-    waiting: Ring
-    recent: Ring
-    zeros_since: Integers
-    zeros: Array
-    zero_sets: Integers
+    clock: Integers  # (10,), whole numbers by the names above; stamps in ns, CHECKED and TRUSTED since EPOCH
+    interval: Array  # (1,), running mean of the time between strokes, s; 0 while unknown
+    newest: Integers  # (s,), stamp of the newest sample of every stream, ns; NONE before the first
+    usual: Array  # (s,), time from one sample to the next, ns; 0 while unknown
+    held: Integers  # (s,), samples that are held, see `boom_twin.twin.stamp_check`
+    strokes: Array  # (n,), newest strokes or angles that drive the model, less their zeros, m or rad; NaN where missing
+    taken: Array  # (n,), the same as the model is to take them
+    past: Ring  # expected readings (c,), their deviations and the strokes, of the last `SPAN`
+    waiting: Ring  # measured samples that wait for a stroke, by stamp and stream
+    recent: Ring  # measured less expected, without any zero
+    zeros_since: Integers  # (ZEROS,)
+    zeros: Array  # (ZEROS, s, w), what sensors read too much from a stamp on
+    zero_sets: Integers  # (1,), how many
 
 
 @by_reference
 class Limits(NamedTuple):
-    """Limits that `update` checks samples against.
+    """Limits that `update` checks samples against."""
 
-    gap, leap : ns. drive : code of the stream that drives the model, of strokes (m) or angles (rad). far : by which its
-    readings may be off their estimate at once. rate : of the fastest, per s. shortest, longest : (n,) readings that there can
-    be. turns : (n,) whether they may be whole turns off.
-    valid : m, how far the tip may be from the undeformed boom's.
-    gravity : (2,) m/s^2.
-    absolute : (n,) whether the angle sensor of a joint is an inclinometer.
-    absent : (c,) measured channels without a sensor.
-    first, channels : (s,) first column of every stream among the measured channels, and how many it has; 0 if it is not used.
-    """
-
-    gap: int
-    leap: float
-    drive: int
-    far: float
-    rate: float
-    shortest: Array
-    longest: Array
-    turns: Flags
-    valid: float
-    gravity: Array
-    absolute: Flags
-    absent: Flags
-    first: Integers
-    channels: Integers
+    gap: int  # ns
+    leap: float  # ns
+    drive: int  # code of the stream that drives the model, of strokes (m) or angles (rad)
+    far: float  # by which its readings may be off their estimate at once
+    rate: float  # of the fastest, per s
+    shortest: Array  # (n,), least reading that there can be
+    longest: Array  # (n,), greatest
+    turns: Flags  # (n,), whether they may be whole turns off
+    valid: float  # m, how far the tip may be from the undeformed boom's
+    gravity: Array  # (2,), m/s^2
+    absolute: Flags  # (n,), whether the angle sensor of a joint is an inclinometer
+    absent: Flags  # (c,), measured channels without a sensor
+    first: Integers  # (s,), first column of every stream among the measured channels
+    channels: Integers  # (s,), how many it has; 0 if it is not used
 
 
 @by_reference
 class UpdateOutput(NamedTuple):
-    """Buffers for the results of a call, see `boom_twin.twin.blocks`; `counts` has the rows of predictions, and of residuals.
+    """Buffers for the results of a call, see `boom_twin.twin.blocks`."""
 
-    rows : results and estimates, see `boom_twin.kernels.result_row`. estimates : see `boom_twin.deviation.estimate_row`.
-    measured : strokes less their zeros, m. raw : as measured.
-    """
-
-    counts: Integers
+    counts: Integers  # rows of predictions, and of residuals
     at: Integers
     stamps: Integers
-    rows: Array
+    rows: Array  # results and estimates, see `boom_twin.kernels.result_row`
     moments: Array
-    estimates: Array
-    measured: Array
+    estimates: Array  # see `boom_twin.deviation.estimate_row`
+    measured: Array  # strokes less their zeros, m
     residual_at: Integers
     residual_streams: Integers
     residual_stamps: Integers
     values: Array
     sigmas: Array
-    raw: Array
+    raw: Array  # as measured
 
 
 def drop_waiting(state: TwinState, first: int, last: int, stream: int | None = None) -> int:
@@ -142,14 +128,15 @@ def new_ring(size: int, values: int, sigmas: int = 0, strokes: int = 0) -> Ring:
     )  # fmt: skip
 
 
-def new_state(joints: int, channels: Integers) -> TwinState:
+def new_state(joints: int, channels: Integers, room: Room) -> TwinState:
     """Return the state of a new twin for so many joints, and so many channels in every stream."""
     streams, width, measured = len(channels), int(channels.max()), int(channels[1:].sum())
     return TwinState(
         clock=np.zeros(10, np.int64), interval=np.zeros(1),
         newest=np.full(streams, NONE), usual=np.zeros(streams), held=np.zeros(streams, np.int64),
         strokes=np.zeros(joints), taken=np.zeros(joints),
-        past=new_ring(KEPT, measured, measured, joints), waiting=new_ring(WAITING, width), recent=new_ring(RECENT, width),
+        past=new_ring(room.expected, measured, measured, joints), waiting=new_ring(WAITING, width),
+        recent=new_ring(room.recent, width),
         zeros_since=np.full(ZEROS, NONE), zeros=np.zeros((ZEROS, streams, width)), zero_sets=np.ones(1, np.int64),
     )  # fmt: skip
 
@@ -163,8 +150,7 @@ def new_output(samples: int, joints: int, row: int, moments: int, channels: Inte
         estimates=np.zeros((samples, WIDTH)), measured=np.zeros((samples, joints)),
         residual_at=np.zeros(residuals, np.int64), residual_streams=np.zeros(residuals, np.int64),
         residual_stamps=np.zeros(residuals, np.int64),
-        values=np.full((residuals, width), np.nan), sigmas=np.full((residuals, width), np.nan),
-        raw=np.full((residuals, width), np.nan),
+        values=np.zeros((residuals, width)), sigmas=np.zeros((residuals, width)), raw=np.zeros((residuals, width)),
     )  # fmt: skip
 
 

@@ -11,9 +11,8 @@ from ..config.settings import Settings
 from ..errors import UsageError
 from ..health.monitor import warm_up
 from ..scene.kinematics import strokes_of_angles
-from ..types import SECOND, Array, Health, Report, Sample, Stream, StrokeReading
-from .block_update import CAPACITY
-from .blocks import CODES, STREAMS, ReportBlock, SampleBlock, block_of
+from ..types import SECOND, Array, Clock, Health, Report, Sample, Stream, StrokeReading
+from .blocks import STREAMS, ReportBlock, SampleBlock, block_of
 from .loaded_model import LoadedModel
 from .readings import check_units, merged, samples_of
 from .sample_taker import SampleTaker
@@ -47,6 +46,10 @@ class Twin(SampleTaker):
         True if no sample may wait for the name of a cause.
     places : mapping of str to Place, optional
         Of sensors that have one, such as ``imu_2``. The tip IMU is at the tip if it is not among them.
+    lagging : collection of Stream
+        Streams whose stamps are late, or early, by a time that is not known. It is estimated, see `clocks`.
+    room : Room
+        Rows of its buffers, see `boom_twin.twin.state.Room`.
 
     Attributes
     ----------
@@ -88,6 +91,11 @@ class Twin(SampleTaker):
         """Log likelihood of all readings, up to a constant that depends on the samples alone."""
         return self._boom.evidence
 
+    @property
+    def clocks(self) -> dict[Stream, Clock]:
+        """Lag and drift of every lagging stream, as estimated by now."""
+        return self._boom.clocks
+
     def rezero(self, sensor: str) -> dict[str, float]:
         """Request the mean residual of the last second as the zero of a sensor; return its new zeros by channel.
 
@@ -122,7 +130,7 @@ class Twin(SampleTaker):
         return found
 
     def model(self, settings: Settings) -> LoadedModel:
-        """Return the model under the load of `settings`; another thread may call this, since the twin keeps its own model.
+        """Return the model under the load of `settings`; another thread may call this.
 
         Parameters
         ----------
@@ -131,7 +139,7 @@ class Twin(SampleTaker):
         Returns
         -------
         LoadedModel
-            What `ModelPreparation` gives to `requests.tune`.
+            For `requests.tune`.
 
         Raises
         ------
@@ -141,7 +149,7 @@ class Twin(SampleTaker):
         return self._model(settings)
 
     def zeros(self, channels: Collection[str]) -> tuple[Array, Array]:
-        """Return what sensors of angles, IMU and forces are estimated to read too much, and the variances of that.
+        """Return the estimated zeros of sensors of angles, IMU and forces, and their variances.
 
         Parameters
         ----------
@@ -211,7 +219,7 @@ class Twin(SampleTaker):
         Parameters
         ----------
         readings : mapping of str to float or sequence
-            As for `boom_twin.twin.readings.samples_of`.
+            As for `update`.
         stamp_ns : int
             Time of the readings, ns.
 
@@ -257,8 +265,7 @@ class Twin(SampleTaker):
         Returns
         -------
         list of ReportBlock or Report
-            In the order of the samples: blocks of those of which nothing out of the ordinary is to be told, and a report of
-            every other sample.
+            In the order of the samples: blocks of reports of regular samples, and a report of every other sample.
 
         Raises
         ------
@@ -267,12 +274,10 @@ class Twin(SampleTaker):
         """
         found: list[ReportBlock | Report] = []
         block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
-        if not self._edge.is_sure:
-            self._edge.look_at(block.stamps[block.streams == CODES[self._drive]])
         row, size, channels, self._judged = 0, len(block.stamps), self._widths, True
         while row < size:
             if self._run is not None and self._edge.is_sure and not self.requests.due:
-                end = row + CAPACITY
+                end = row + self._room.samples
                 if self._fault_twins is not None:  # they take a second before its verdict may be asked for
                     self._fault_twins.reach(int(block.stamps[row]), self._failing)
                     is_later = block.stamps[row:end] // SECOND != block.stamps[row] // SECOND

@@ -26,7 +26,6 @@ from .state import (
     FIRST,
     IN_SLOT,
     IS_DEFLECTED,
-    KEPT,
     NEWEST,
     SLOT,
     STATUS,
@@ -37,7 +36,6 @@ from .state import (
 )  # fmt: skip
 
 SPAN = 2_000_000_000  # ns for which expected readings are kept
-ALONE = np.int64(0)  # row of a sample that comes alone; typed, because numba compiles once more for every literal
 
 DONE, ODD, LOOK, FAILED = range(4)
 """Reason why `update` returned: all samples taken; the sample is irregular; the sample is complete and begins a slot, or is
@@ -46,32 +44,18 @@ outside the model's validity; the model failed (see `STATUS`)."""
 
 @kernel
 def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stamps, values, first, trusted, found):
-    """Take the samples of a block from row `first` on, as long as they are regular.
+    """Take the samples of a block from row `first` on, as long as they are regular; return the reason for the end, and its row.
 
-    Parameters
-    ----------
-    t, boom, live, work, p, f, bending, out : fields of CompiledBoom
-        See `boom_twin.deviation.predictor`; as they are, because tuples of tuples take long to compile.
-    limits : Limits
-    state : TwinState
-        Of a run that has begun.
-    streams, stamps, values : ndarray
-        See `boom_twin.twin.blocks.SampleBlock`.
-    trusted : bool
-        Whether row `first`, the only one, was looked at before; of strokes, ``state.strokes`` and ``state.taken`` hold them.
-    found : Found
-        What it gives is added here.
-
-    Returns
-    -------
-    reason, row : int
-        See `DONE`; the row that it is about.
+    `t` to `out` are the fields of `boom_twin.deviation.predictor.CompiledBoom`, as they are: tuples of tuples take long to
+    compile. `streams`, `stamps`, `values` are those of a `boom_twin.twin.blocks.SampleBlock`. A `trusted` row, the only one,
+    was looked at before; of strokes, ``state.strokes`` and ``state.taken`` hold them. What it gives is added to `found`, an
+    `UpdateOutput`.
     """
     row = first
     while row < stamps.shape[0]:
         stamp, before = stamps[row], found.counts[1]
         if streams[row] != limits.drive:
-            if not compare(limits, state, streams[row], stamp, values[row], row, trusted, found):
+            if not compare(limits, state, f.lags, streams[row], stamp, values[row], row, trusted, found):
                 return ODD, row
             take_residuals(limits, state, p, f, before, found)
             row += 1
@@ -100,19 +84,6 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
         if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED]:
             return LOOK, row - 1
     return DONE, row
-
-
-@kernel
-def measure(p, f, limits, state, stream, stamp, values, trusted, found):
-    """Take one measured sample as `update` does, but without the boom; return False, with nothing done, if irregular.
-
-    A `trusted` sample is refused only if no readings were expected at its stamp.
-    """
-    before = found.counts[1]
-    if not compare(limits, state, stream, stamp, values, ALONE, trusted, found):
-        return False
-    take_residuals(limits, state, p, f, before, found)
-    return True
 
 
 @inner
@@ -183,7 +154,7 @@ def keep_strokes(state, stamp):
     """Store the newest strokes with those of the last `SPAN`; return their row, where the expected readings go."""
     past = state.past
     while past.bounds[COUNT] > 0 and past.stamps[past.bounds[FIRST]] < stamp - SPAN:
-        past.bounds[FIRST] = (past.bounds[FIRST] + 1) % KEPT
+        past.bounds[FIRST] = (past.bounds[FIRST] + 1) % past.stamps.shape[0]
         past.bounds[COUNT] -= 1
     at = new_row(past)
     past.stamps[at] = stamp
@@ -196,19 +167,22 @@ def keep_strokes(state, stamp):
 
 
 @inner
-def compare(limits, state, stream, stamp, values, row, trusted, found):
+def compare(limits, state, lags, stream, stamp, values, row, trusted, found):
     """Write the residuals of a measured sample, or store it until its strokes come.
+
+    Its stamp is corrected by the estimated lag of its stream.
 
     Return False, with nothing done, if the sample is irregular.
     """
     if not trusted and not is_regular(limits, state, stream, stamp, values):
         return False
-    if stamp > state.clock[NEWEST]:
+    taken = stamp - np.int64(np.rint(lags[stream] / NANO))
+    if taken > state.clock[NEWEST]:
         if state.waiting.bounds[COUNT] == WAITING:
             forget_waiting(state.waiting, 1)
             state.clock[UNMATCHED] += 1
-        wait(limits, state, stream, stamp, values)
-    elif not write_residual(limits, state, stream, stamp, values, row, found):
+        wait(limits, state, stream, taken, values)
+    elif not write_residual(limits, state, stream, taken, values, row, found):
         return False
     if not trusted:
         note_stamp(state, stream, stamp)
@@ -264,8 +238,8 @@ def write_residual(limits, state, stream, stamp, values, row, found):
     if after < 0:
         return False
     zeros = zeros_at(state, stamp)
-    before = (after + KEPT - 1) % KEPT
     past, at, k = state.past, limits.first[stream], new_residual(found, row, stream, stamp)
+    before = (after if after > 0 else past.stamps.shape[0]) - 1
     recent = new_row(state.recent)
     state.recent.stamps[recent], state.recent.streams[recent] = stamp, stream
     for i in range(limits.channels[stream]):
@@ -290,7 +264,7 @@ def matched(past, stamp):
     """
     at = -1
     for back in range(past.bounds[COUNT]):
-        row = (past.bounds[FIRST] + past.bounds[COUNT] - 1 - back) % KEPT
+        row = (past.bounds[FIRST] + past.bounds[COUNT] - 1 - back) % past.stamps.shape[0]
         if past.stamps[row] == stamp:
             return row, 1.0
         if past.stamps[row] < stamp:

@@ -48,32 +48,15 @@ def stiffness(pin_radius: float, clearance: float, young: float, poisson: float)
 
 @dataclass(frozen=True)
 class Contact:
-    """A pin in a bush.
+    """A pin in a bush. Friction opposes the sliding of the pin's centre around the bush; the pin's own turn makes none."""
 
-    Attributes
-    ----------
-    stiffness : float
-        K, N/m^n.
-    hysteresis : float
-        chi.
-    clearance : float
-        c, radial, m.
-    exponent : float
-        n.
-    smoothing : float
-        eps, m; 0 is the sharp gap.
-    friction, slip : float
-        Coefficient, and the speed (m/s) at which tanh(speed / slip) of it acts. It opposes the sliding of the pin's
-        centre around the bush; that the pin turns about itself makes no friction here.
-    """
-
-    stiffness: float
-    hysteresis: float
-    clearance: float
-    exponent: float = 1.5
-    smoothing: float = 0.0
-    friction: float = 0.0
-    slip: float = 1e-2
+    stiffness: float  # K, N/m^n
+    hysteresis: float  # chi
+    clearance: float  # c, radial, m
+    exponent: float = 1.5  # n
+    smoothing: float = 0.0  # eps, m; 0 is the sharp gap
+    friction: float = 0.0  # coefficient
+    slip: float = 1e-2  # speed (m/s) at which tanh(speed / slip) of the friction acts
 
     def gap(self, offset: complex) -> float:
         """Return the gap |offset| - c, m: negative in flight."""

@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..scene.schema import Scene
-from ..types import NO_PLACES, SENSORS, Place, Stream, StrokeReading, channels_of
+from ..types import SENSORS, Stream, channels_of
 from .expected import Expected, RestModel
 from .hypotheses import (
     ANY_ZERO,
@@ -48,33 +47,16 @@ Declared = Mapping[Stream, Sequence[Channel]]
 
 
 class Verdict(NamedTuple):
-    """Result about one channel.
-
-    Attributes
-    ----------
-    stream : Stream
-    channel : str
-    declared : Channel
-    best : Channel or None
-        Most likely way to read it, None if no name is left for it.
-    margin : float
-        Nats by which every other way is less likely.
-    is_wrong : bool
-        True if it is not read as declared.
-    is_explained : bool
-        True if `best` explains the readings.
-    has_no_gravity : bool
-        True if the driver of an IMU removes gravity.
-    """
+    """Result about one channel."""
 
     stream: Stream
     channel: str
     declared: Channel
-    best: Channel | None
-    margin: float
-    is_wrong: bool
-    is_explained: bool = True
-    has_no_gravity: bool = False
+    best: Channel | None  # most likely way to read it, None if no name is left for it
+    margin: float  # nats by which every other way is less likely
+    is_wrong: bool  # it is not read as declared
+    is_explained: bool = True  # `best` explains the readings
+    has_no_gravity: bool = False  # the driver of an IMU removes gravity
 
     @property
     def is_sure(self) -> bool:
@@ -90,6 +72,12 @@ class Checked(NamedTuple):
     expected: Expected
     tables: Mapping[Stream, Table]
 
+    def lacks(self, verdict: Verdict) -> bool:
+        """Return True if a channel is in no message, while others of its stream are read as declared."""
+        own = [each for each in self.verdicts if each.stream is verdict.stream]
+        names = self.tables[verdict.stream].names
+        return verdict.declared.name not in names and not any(each.is_wrong for each in own)
+
     @property
     def has_strokes_alone(self) -> bool:
         """Return True if no other sensor was read. Strokes swapped or shifted within the travels are then not found."""
@@ -97,10 +85,7 @@ class Checked(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """Best ways to read one stream under an explanation.
-
-    `cost` is in nats. `margin` takes the index of a channel. The other fields are those of `Verdict`, by channel.
-    """
+    """Best ways to read one stream under an explanation, by channel as in `Verdict`; `cost` is in nats."""
 
     cost: float
     best: tuple[Channel | None, ...]
@@ -118,43 +103,18 @@ class _Explanation:
     cost: float
 
 
-def check(
-    scene: Scene,
-    reads: StrokeReading,
-    declared: Declared,
-    window: Window,
-    is_quick: bool = False,
-    places: Mapping[str, Place] = NO_PLACES,
-) -> Checked | None:
-    """Check the declaration of a rig's sensors against readings.
+def check(model: RestModel, declared: Declared, window: Window, is_quick: bool = False) -> Checked | None:
+    """Check the declaration of a rig's sensors against readings; None if no block has all strokes, or nothing explains them.
 
-    Parameters
-    ----------
-    scene : Scene
-        Scene with load.
-    reads : StrokeReading
-        Quantity of the stroke readings.
-    declared : mapping of Stream to sequence of Channel
-        Declaration of every channel, in the order of the channels.
-    window : mapping of Stream to mapping of str to Series
-        Readings by name (IMU: by axis). Strokes are required.
-    is_quick : bool
-        Flag channels not read as declared, without a correction.
-    places : mapping of str to Place
-        See `boom_twin.Twin`.
-
-    Returns
-    -------
-    Checked or None
-        None if no block has readings of every stroke, or there is no explanation.
+    `declared` has every channel in their order. `window` has readings by name (IMU: by axis); strokes are required.
+    `is_quick` only flags channels that are not read as declared.
     """
     tables = {stream: table for stream, table in tables_of(window).items() if len(table.names)}
     strokes = tables.get(Stream.STROKES)
-    if strokes is None or not len(strokes.values) or len(strokes.names) < len(scene.joints):
+    if strokes is None or not len(strokes.values) or len(strokes.names) < len(model.scene.joints):
         return None
     moved = bool((np.ptp(strokes.values, axis=0) > MOVED * np.abs(strokes.values).max()).any())
-    model, weight = RestModel(scene, reads, places), MOVED_WEIGHT if moved else STILL_WEIGHT
-    checker = _Checker(model, declared, tables, weight, is_quick)
+    checker = _Checker(model, declared, tables, MOVED_WEIGHT if moved else STILL_WEIGHT, is_quick)
     return Checked(checker.verdicts(), moved, checker.found[0].expected, tables) if checker.found else None
 
 

@@ -26,7 +26,7 @@ FORCE_SHARE, FORCE_LEAST = 0.12, 0.04  # force error by loads, relative to the f
 MOST = 12.0  # nats, largest cost of a block, as a reading may err for a reason without hypothesis
 NEAR_ZERO = math.radians(5.0)  # tolerance of zeros (left to calibration) and of quarter and half turns
 UNIT, OTHER_UNIT, SIGN, NAME, EXTRA_NAME = 4.0, 9.0, 4.0, 3.0, 6.0  # nats, prior costs of changes
-REVERSED, PIN_TO_PIN, HALF_TURN, SMALL_ZERO, ANY_ZERO = 6.0, 5.0, 5.0, 6.0, 9.0
+REVERSED, PIN_TO_PIN, HALF_TURN, SMALL_ZERO, ANY_ZERO = 6.0, 3.0, 5.0, 6.0, 9.0  # pin to pin is likelier than inches
 ABSOLUTE, TURNED, NO_GRAVITY = 4.0, 8.0, 4.0
 IMPOSSIBLE = 1e6  # nats
 OUTSIDE = 60.0  # nats for strokes beyond the travel
@@ -37,25 +37,13 @@ TAU = 2.0 * math.pi
 
 
 class Cube(NamedTuple):
-    """Costs of the readings of one stream.
-
-    Attributes
-    ----------
-    costs : ndarray, shape (n, names, hypotheses)
-        Costs other than unit and sign (see `common_costs`).
-    channels : dict of (int, int, int) to Channel
-        Way to read a channel under a hypothesis.
-    units, declared_units : ndarray of int, shape (n, names, hypotheses)
-        Indices of the unit and of the declared unit among the units of the stream.
-    reversals : ndarray of bool, shape (n, names, hypotheses)
-        True if the sign is not as declared.
-    """
+    """Costs of the readings of one stream, other than unit and sign (see `common_costs`); arrays (n, names, hypotheses)."""
 
     costs: Array
-    channels: Mapping[tuple[int, int, int], Channel]
-    units: NDArray[np.int64]
+    channels: Mapping[tuple[int, int, int], Channel]  # way to read a channel under a hypothesis
+    units: NDArray[np.int64]  # indices among the units of the stream
     declared_units: NDArray[np.int64]
-    reversals: NDArray[np.bool_]
+    reversals: NDArray[np.bool_]  # the sign is not as declared
 
 
 def common_costs(cube: Cube, unit: int | None, is_reversed: bool) -> Array:
@@ -198,10 +186,7 @@ def angle_cube(table: Table, declared: Sequence[Channel], expected: Expected, we
 
 
 def _zeros(off: Array, is_encoder: bool, weight: float) -> Iterator[tuple[float, Array, Array]]:
-    """Yield prior cost, zeros (ways,) in rad and misfits (ways,) for angle errors `off` (ways, blocks), rad.
-
-    The decoder itself removes one turn.
-    """
+    """Yield prior cost, zeros (ways,) in rad and misfits (ways,) of angle errors (ways, blocks); decoders remove a turn."""
     turns = np.round(off / TAU)
     wrapped = off - TAU * turns
     known = np.isfinite(wrapped)

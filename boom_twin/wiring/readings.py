@@ -45,18 +45,11 @@ Window = Mapping[Stream, Mapping[str, Series]]
 
 
 class Table(NamedTuple):
-    """Readings of one stream in the blocks that are compared.
-
-    Attributes
-    ----------
-    names : tuple of str
-    values, spreads : ndarray, shape (blocks, names)
-        Means and their standard errors by vibration, NaN without readings.
-    """
+    """Readings of one stream in the blocks that are compared."""
 
     names: tuple[str, ...]
-    values: Array
-    spreads: Array
+    values: Array  # (blocks, names), means, NaN without readings
+    spreads: Array  # their standard errors by vibration
 
 
 def tables_of(window: Window) -> dict[Stream, Table]:

@@ -9,6 +9,7 @@ from .check import Checked, Verdict
 from .readings import Channel
 
 UNEXPLAINED = "no name, unit, sign or zero explains its readings"
+ABSENT = "in no message: no such sensor, or it is broken"
 STROKES_ALONE = "strokes are within the travels; swapped or shifted ones show only beside angles, forces or an IMU"
 
 
@@ -25,6 +26,8 @@ def reading(way: Channel) -> str:
 
 def finding(verdict: Verdict, checked: Checked) -> str:
     """Return the finding about a channel."""
+    if checked.lacks(verdict):
+        return ABSENT
     if not verdict.is_wrong:
         return "within the travel" if checked.has_strokes_alone else "as declared"
     if not verdict.is_explained or verdict.best is None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
-from recordings import FILE_NAME, Session, SessionWriter, read, read_metadata, recover, scan, write_metadata, write_session
+from recordings import FILE_NAME, MessageWriter, Session, read, read_metadata, recover, scan, write_metadata, write_session
 from ros_messages import Topic, jazzy, load_topics, new_message
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
@@ -32,7 +32,7 @@ POINT = Topic(
 
 
 def write_points(directory: Path, count: int, compression: CompressionType = CompressionType.ZSTD) -> None:
-    with SessionWriter(directory, {"point": POINT}, {"origin": "synthetic"}, compression=compression) as bag:
+    with MessageWriter(directory, {"point": POINT}, {"origin": "synthetic"}, compression=compression) as bag:
         for number in range(count):
             msg = new_message(POINT.type)
             msg.point.x = float(number)
@@ -102,7 +102,7 @@ def test_file_is_as_the_contract_says(bag: Path) -> None:
 
 def test_a_run_that_fails_leaves_no_bag_that_looks_whole(tmp_path: Path) -> None:
     """What was written can be saved."""
-    with pytest.raises(ZeroDivisionError), SessionWriter(tmp_path / "bag", {"point": POINT}) as bag:
+    with pytest.raises(ZeroDivisionError), MessageWriter(tmp_path / "bag", {"point": POINT}) as bag:
         bag.write("point", 1, new_message(POINT.type))
         raise ZeroDivisionError
     assert not (tmp_path / "bag" / "metadata.yaml").exists()
@@ -123,7 +123,7 @@ def test_nothing_is_overwritten_and_shapes_must_agree(bag: Path, tmp_path: Path,
 
 
 def test_an_empty_bag_is_whole_but_its_topic_is_refused(tmp_path: Path) -> None:
-    with SessionWriter(tmp_path / "bag", {"strokes": load_topics().inputs[Stream.STROKES]}):
+    with MessageWriter(tmp_path / "bag", {"strokes": load_topics().inputs[Stream.STROKES]}):
         pass
     session = scan(tmp_path / "bag")
     assert [(topic.name, topic.count) for topic in session.topics] == [("/cylinder_strokes", 0)]

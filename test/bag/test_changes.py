@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from default_boom import joint_angles_of_strokes, strokes_of_posture
-from recordings import SessionWriter, read, scan, sensor_message
+from recordings import MessageWriter, read, scan, sensor_message
 from ros_messages import TYPES, Output, decode_changes, encode_changes, jazzy, load_topics, new_message
 
 from boom_twin import BagError, Sample, Settings, Stream, load_scene, replay
@@ -74,7 +74,7 @@ def test_a_replay_repeats_the_changes_of_its_session(tmp_path: Path) -> None:
     joints = joint_angles_of_strokes(scene, strokes)
     keys = {"s": topics.inputs[Stream.STROKES], "a": topics.inputs[Stream.ANGLES], "c": topics.outputs[Output.CHANGES]}
     told = Change(5 * SECOND, True, Settings(payload=50.0).live, {"joint_1": 0.02})
-    with SessionWriter(tmp_path / "bag", keys) as bag:
+    with MessageWriter(tmp_path / "bag", keys) as bag:
         for k in range(100):
             stamp = 4 * SECOND + 20_000_000 * k
             bag.write("s", stamp, sensor_message(Sample(Stream.STROKES, stamp, strokes)))
@@ -82,7 +82,7 @@ def test_a_replay_repeats_the_changes_of_its_session(tmp_path: Path) -> None:
             if stamp == told.stamp:
                 bag.write_encoded("c", stamp + 1_000_000, encode_changes(told))
     result = replay(tmp_path / "bag", scene, tmp_path / "out")
-    predictions, residuals = result.recording.predictions, result.recording.of(Stream.ANGLES)
+    predictions, residuals = result.recording.whole.predictions, result.recording.whole.of(Stream.ANGLES)
     assert predictions.tip_position[49, 1] - predictions.tip_position[50, 1] > 0.01
     assert residuals.values[49, 0] - residuals.values[50, 0] > 0.015
     events = json.loads((tmp_path / "out" / "summary.json").read_text())["events"]

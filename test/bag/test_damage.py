@@ -13,7 +13,7 @@ from command import main
 from fuzz.mcap_files import joined, records
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType
-from recordings import FILE_NAME, Session, SessionWriter, read, scan
+from recordings import FILE_NAME, MessageWriter, Session, read, scan
 from ros_messages import load_topics
 
 from boom_twin import BagError, Stream
@@ -145,7 +145,7 @@ def test_nothing_there(tmp_path: Path, content: Content) -> None:
 @pytest.mark.parametrize("data", [b"", b"\x00\x01\x00\x00\x05", b"\x00\x01\x00\x00" + bytes(500)])
 def test_a_message_that_cannot_be_decoded_is_named(tmp_path: Path, data: bytes) -> None:
     topic = load_topics().inputs[Stream.STROKES]
-    with SessionWriter(tmp_path / "bag", {"strokes": topic}) as bag:
+    with MessageWriter(tmp_path / "bag", {"strokes": topic}) as bag:
         bag.write_encoded("strokes", 77, data)
     with pytest.raises(BagError, match=r"session_0\.mcap: topic /cylinder_strokes at log time 77 ns"):
         list(read(scan(tmp_path / "bag"), {"cylinder_strokes": JOINT_STATE}))

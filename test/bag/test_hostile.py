@@ -17,7 +17,7 @@ import pytest
 import zstandard
 from command import main
 from mcap.writer import MCAP0_MAGIC
-from recordings import SessionWriter, read, recover, scan
+from recordings import MessageWriter, read, recover, scan
 from ros_messages import load_topics
 
 from boom_twin import BagError, Stream
@@ -112,7 +112,7 @@ def test_recovery_writes_into_its_folder_alone(bag: Path, tmp_path: Path) -> Non
 
 def write_raw(directory: Path, *bodies: bytes) -> Path:
     """A session of strokes from encoded messages."""
-    with SessionWriter(directory, {"strokes": load_topics().inputs[Stream.STROKES]}) as bag:
+    with MessageWriter(directory, {"strokes": load_topics().inputs[Stream.STROKES]}) as bag:
         for number, body in enumerate(bodies, start=1):
             bag.write_encoded("strokes", number, body)
     return directory
@@ -154,7 +154,7 @@ def test_a_truth_that_unpacks_without_end_is_refused(tmp_path: Path, monkeypatch
 def test_words_of_a_stranger_are_quoted_in_new_metadata(tmp_path: Path) -> None:
     """A note that looks like YAML stays a text."""
     note = "x\n!!python/object/apply:os.system [id]\nrosbag2_bagfile_information: {version: 1}\n- &a *a"
-    with SessionWriter(tmp_path / "bag", {"strokes": load_topics().inputs[Stream.STROKES]}, {"origin": note}) as bag:
+    with MessageWriter(tmp_path / "bag", {"strokes": load_topics().inputs[Stream.STROKES]}, {"origin": note}) as bag:
         bag.write_encoded("strokes", 1, HEAD + bytes(16))
     assert scan(tmp_path / "bag").notes == {"origin": note}
     recover(tmp_path / "bag", tmp_path / "out")

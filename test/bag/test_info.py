@@ -11,7 +11,7 @@ import pytest
 from command import main
 from mcap.reader import make_reader
 from mcap.writer import Writer
-from recordings import FILE_NAME, SessionWriter
+from recordings import FILE_NAME, MessageWriter
 from ros_messages import joint_state, load_topics
 
 from boom_twin import Stream
@@ -45,7 +45,7 @@ Row = tuple[Stream, int, int, list[str]]
 
 def write(directory: Path, rows: list[Row]) -> Path:
     topics = {stream: load_topics().inputs[stream] for stream in dict.fromkeys(stream for stream, *_ in rows)}
-    with SessionWriter(directory, {stream.value: topic for stream, topic in topics.items()}) as bag:
+    with MessageWriter(directory, {stream.value: topic for stream, topic in topics.items()}) as bag:
         for stream, log_time, stamp, names in rows:
             bag.write(stream.value, log_time, joint_state(names, np.zeros(len(names)), stamp))
     return directory
@@ -80,7 +80,7 @@ def test_names_missing_and_extra(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 
 def test_what_is_missing_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with SessionWriter(tmp_path / "bag", {"imu": load_topics().inputs[Stream.IMU]}):
+    with MessageWriter(tmp_path / "bag", {"imu": load_topics().inputs[Stream.IMU]}):
         pass
     values = told(capsys, tmp_path / "bag")
     places = ("no topic cylinder_strokes", "no topic joint_angles", "topic /tip_imu has no messages")

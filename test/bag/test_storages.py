@@ -6,7 +6,6 @@ import csv
 import json
 import sqlite3
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from boom_twin import BagError, TimeWindow, load_scene, replay
 from boom_twin.batch.sources import sessions_of
 from boom_twin.offline.inputs import ReplayOptions
 from boom_twin.offline.replay import replay_into
-from boom_twin.offline.sample_table import SampleTable, table_file
+from boom_twin.offline.sample_table import SampleTable, columns_of, table_file
 from boom_twin.system.result_folder import REPLAY, result_folder
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
@@ -104,9 +103,11 @@ def moving(folder: Path) -> Path:
 
 def table_of(session: Path, out: Path) -> bytes:
     with result_folder(out, REPLAY, [session]) as building:
-        table = SampleTable(partial(table_file, building.folder / "samples.csv"), 4)
+        file = table_file(building / "samples.csv", columns_of(4))
+        table = SampleTable(file.write, 4)
         replay_into(building, session, load_scene(), options=ReplayOptions(health=False), take=table.add)
         table.finish()
+        file.close()
     return (out / "samples.csv").read_bytes()
 
 

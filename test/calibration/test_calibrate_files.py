@@ -48,6 +48,15 @@ def ran(source, short, tmp_path_factory):
     return folder, arguments, found[0]
 
 
+def test_a_result_that_does_worse_on_what_was_held_out_is_written_and_refused(source, short, tmp_path, capsys):
+    """Joint 1 reads 0.01 rad too much in the part that is fitted, and as much too little in the last third."""
+    wrong = np.where(np.arange(30 * 200)[:, None] < 20 * 200, 0.01, -0.01) * [1.0, 0.0]
+    bag, out = short.write(tmp_path / "bag", 2, zeros=wrong), tmp_path / "new.yaml"
+    options = ["--scene", str(source), "--parameters", "joint_1.zero", "--no-pictures"]
+    assert main(["calibrate", str(bag), *options, "--out", str(out)]) == 1
+    assert "residuals of joint_1 have grown: do not use this result" in capsys.readouterr().err and out.is_file()
+
+
 def test_the_new_scene_keeps_comments_and_tells_where_it_is_from(ran, source, short):
     folder, *_ = ran
     old, new = source.read_text(), (folder / "new.yaml").read_text()

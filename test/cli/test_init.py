@@ -1,9 +1,7 @@
-"""`boom_twin init`: from the example table, from answers, and what it refuses."""
+"""`boom_twin init`: from the example table, and what it refuses."""
 
 from __future__ import annotations
 
-import io
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,44 +9,6 @@ from command import main
 from default_boom import default_text
 
 from boom_twin import load_scene
-
-ANSWERS = """Small boom
-0, 0
-0.40, -1100 mm
-12 kg/m
-25
-
-
-2
-4000 mm
-0.55, 3.75
-200 kg
-200 mm
-120 mm
-6 mm
-0.55, -0.12
-
-0, 75
-100 mm
-70 mm
-3.5
-0.25, 3.5
-150 mm
-90 mm
-6 mm
-B1
--150, 0
-80 mm
-50 mm
--0.82, 0.18
--0.14, -0.04
-0.12, 0.062
-0.42
-0.377
-4
-3
-"""
-
 
 MADE = ["init", "--table", "table.yaml", "--out", "boom.yaml"]
 
@@ -84,6 +44,7 @@ def test_nothing_is_written_over(table: str, capsys: pytest.CaptureFixture[str])
     with pytest.raises(SystemExit) as ended:
         main(["init", "--table", "table.yaml"])
     assert ended.value.code == 2 and "one of the arguments --out --example-table is required" in capsys.readouterr().err
+    assert main(["init", "--out", "new.yaml"]) == 1 and "--example-table prints one" in capsys.readouterr().err
 
 
 def test_a_warned_table_is_mended_and_written_anew(table: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -97,18 +58,6 @@ def test_a_warned_table_is_mended_and_written_anew(table: str, capsys: pytest.Ca
     assert main(again[1:]) == 0
     assert "sections[1].beam" not in capsys.readouterr().err
     assert main(["check", "boom.yaml", "--strict"]) == 0
-
-
-def test_answers_make_a_scene_and_are_kept(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(sys, "stdin", io.StringIO(ANSWERS))
-    assert main(["init", "--out", "boom.yaml"]) == 0
-    out = capsys.readouterr().out
-    assert "sections[0].height = '200 kg': `kg` is no unit of this key, which is in m" in out
-    scene = load_scene("boom.yaml")
-    assert [joint.kind for joint in scene.joints] == ["A", "B1"]
-    assert pytest.approx(3.696e-3) == scene.sections[0].A and scene.base.cylinder_pin == (0.4, -1.1)
-    assert main(["init", "--table", "boom.table.yaml", "--out", "again.yaml"]) == 0
-    assert load_scene("again.yaml") == scene
 
 
 COLUMNS = {

@@ -161,7 +161,7 @@ def test_no_recording_is_written_over(scene: Path, tmp_path: Path, capsys: pytes
     for command in commands:
         assert main(command) == 1
         words = capsys.readouterr().err
-        reasons = "metadata.yaml already|source|file of a recording|this file is read|no earlier result|only an earlier replay"
+        reasons = "metadata.yaml already|source|file of a recording|this file is read|no earlier result|only an earlier result"
         assert re.search(reasons, words), (command, words)
     assert {path.name: path.read_bytes() for path in bag.iterdir()} == dict.fromkeys(
         ("session_0.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz"), b"recorded"

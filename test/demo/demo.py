@@ -146,7 +146,7 @@ def main() -> int:
             stretches: list[Stretch] = []
             scene, settings = scene_of(recorded), settings_of(recorded).settings
             found = evaluated_replay(building, recorded, scene, settings, also=stretches.append)
-            pictures = [path.name for path in draw(found.result, found.history, found.scene, building.folder)]
+            pictures = [path.name for path in draw(found.result, found.history, found.scene, building)]
         name, equal = f"{session.path.name} ({about})", _equal(live, stretches)
         print("\n".join(live.as_text(name, sent[Stream.STROKES.value], equal, found.result.summary)))
         for path in [recorded, *(args.out / "replay" / name for name in pictures)]:

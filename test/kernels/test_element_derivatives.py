@@ -11,7 +11,7 @@ import pytest
 from reference.segments.jets import coordinates, cos, sin
 
 from boom_twin.kernels import plane_algebra as algebra
-from boom_twin.kernels.elements import beam, cylinder
+from boom_twin.kernels.elements import beam, beam_equations, cylinder
 from boom_twin.kernels.elements import beam_shapes as modes
 from boom_twin.kernels.elements import rigid_body as rigid
 from boom_twin.kernels.plane_algebra import turned
@@ -143,9 +143,11 @@ def swept(z, row):
     """Cut at the input end and gains, with two carried slots and the outboard side linearised where the end is."""
     _, position, part = placed(z, row)
     s, p, size = END_STIFFNESS.copy(), END_FORCE.copy(), COUNT + 1
-    own = beam.BeamEquations(np.zeros((size, 5)), np.zeros((size, size)), np.zeros(size), np.zeros((beam.LOCAL_ROWS, POINTS)))
+    own = beam_equations.BeamEquations(
+        np.zeros((size, 5)), np.zeros((size, size)), np.zeros(size), np.zeros((beam_equations.LOCAL_ROWS, POINTS))
+    )
     motion, turn = Motion(GAIN, RATE, BEAM_HATS, BEAM_OFFSETS), (np.cos(z[2]), np.sin(z[2]))
-    beam.transfer_beam(row, part, SIZES, own, z[3:], *turn, motion, GRAVITY, position, s, p, np.int64(5))
+    beam_equations.transfer_beam(row, part, SIZES, own, z[3:], *turn, motion, GRAVITY, position, s, p, np.int64(5))
     return s, p, own.force, own.coupling
 
 
@@ -209,7 +211,7 @@ def test_beam_condenses_the_hessian_of_its_energy(beta, finite):
 def test_beam_shape_derivatives(finite):
     row = beam_row(0.0, finite)
     part = placed(BEAM_Z, row)[2]
-    beam.shape_derivatives(part, SIZES, 1.0 + BEAM_Z[-1])
+    beam_equations.shape_derivatives(part, SIZES, 1.0 + BEAM_Z[-1])
     drho = part.drho
     expected = gradient(lambda q: placed(np.append(BEAM_Z[:3], q), row)[2].rho, BEAM_Z[3:])
     assert drho == pytest.approx(np.moveaxis(expected, -1, 1), abs=1e-8)
@@ -257,8 +259,8 @@ def test_outlet_and_offset(slots):
 
     s, p = np.zeros((6, 6)), np.zeros(6)
     s[:slots, :slots], p[:slots] = stiffness, force
-    rigid.pull_back(s, p, slots, 0, 1, *turned(theta, *offset))
-    rigid.merge_outlet(s, p, slots, *turned(theta, *outlet))
+    rigid.pull_back(s, p, slots, 0, 1, *turned(theta, *offset), True)
+    rigid.merge_outlet(s, p, slots, *turned(theta, *outlet), True)
     m = slots - 2
     zero = np.zeros(slots - 2)
     assert m == slots - 2

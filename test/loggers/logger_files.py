@@ -11,7 +11,8 @@ from zoneinfo import ZoneInfo
 import numpy as np
 from recordings import read, scan
 
-from boom_twin.types import SECOND, G
+from boom_twin.sensor_kinds import G
+from boom_twin.types import SECOND
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 TOPICS = {"cylinder_strokes": "JointState", "joint_angles": "JointState", "tip_imu": "Imu"}

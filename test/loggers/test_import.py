@@ -317,6 +317,10 @@ FAULTS = {
     "no table": ("nothing\nto see", "no table found. The file begins with 'nothing'"),
     "no time": (GOOD.replace("Zeit", "Nr"), "no column of times among"),
     "ms or s": (table([TIMELESS], lambda row: f"{0.15 * row:.2f}", numbers(",", 4)), "the times may be in s or ms"),
+    "some times with an offset": (
+        table([TIMELESS], lambda row: f"2026-04-03 10:00:{clock(row)}{'+02:00' * (row < 30)}", numbers(",", 4)),
+        "line 32: Zeit = '2026-04-03 10:00:22.425' and '2026-04-03 10:00:22.125+02:00': only one of them has an offset",
+    ),
     "day or month": (table([TIMELESS], lambda row: f"03/04/2026 10:00:{clock(row)}", numbers(",", 4)), "or month/day"),
 }  # fmt: skip
 
@@ -381,6 +385,18 @@ def test_binary_files_give_the_same_session(tmp_path: Path, write: Callable[[Pat
     for row, (stamp, values) in enumerate(messages(tmp_path / "s")):
         assert stamp == AT_14 + 10_000_000 * row
         assert list(values.values()) == pytest.approx([1e-3 * (value + row) for value in STROKES], abs=1e-12)
+
+
+@pytest.mark.parametrize("write", [write_parquet, write_tdms, write_mf4])
+def test_damaged_binary_files_are_refused_in_one_line(
+    tmp_path: Path, write: Callable[[Path, np.ndarray, np.ndarray], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / f"log.{write.__name__.removeprefix('write_')}"
+    write(path, np.datetime64(AT_14, "ns") + np.arange(ROWS), np.ones((ROWS, 4)))
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 3] + b"\xff" * 40)
+    assert main(["import", str(path), "--out", str(tmp_path / "s")]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{path}: cannot be read (" in line and "Export it as CSV." in line
 
 
 def test_a_library_that_is_missing_is_named_with_the_extra(

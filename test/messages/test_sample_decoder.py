@@ -12,8 +12,11 @@ from hypothesis import strategies as st
 from ros_messages import SampleDecoder, Topics, imu, joint_state, load_topics
 
 from boom_twin import Stream
+from boom_twin.errors import UsageError
+from boom_twin.messages.mapping import mapping_from
 from boom_twin.messages.sample_decoder import MOST_NAMES, ODDITIES
 from boom_twin.messages.topic_table import Sensor, usual
+from boom_twin.messages.type_store import new_message
 from boom_twin.types import SENSORS
 
 FINITE = st.floats(-1e6, 1e6)
@@ -232,3 +235,22 @@ def test_two_sources_of_one_topic_are_told_and_neither_is_used() -> None:
 def test_coarse_stamps_of_one_source_are_no_second_source() -> None:
     decoder, values = SampleDecoder(1), np.random.default_rng(1).normal(0.5, 1e-4, 100).tolist()
     assert len(cycles(decoder, [(10 * MS * (1 + k // 2), {"joint_1": value}) for k, value in enumerate(values)])) == 100
+
+
+@pytest.mark.parametrize(("frame_id", "taken"), [("boom_2", 2), ("boom_3", 0)])
+def test_messages_of_another_frame_are_left_out_and_counted(frame_id: str, taken: int) -> None:
+    topics = mapping_from({"inputs": {"imu_2": {"place": {"section": 2}, "frame_id": "boom_2"}}}, "mapping", 2)
+    decoder, msg = SampleDecoder(2, topics), new_message("sensor_msgs/msg/Imu")
+    msg.header.frame_id, msg.linear_acceleration.z = frame_id, 9.8
+    assert len(decoder.samples(topics.heard["imu_2"], 10**9, msg)) == taken
+    assert decoder.oddities["another frame"] == decoder.refused == (not taken)
+
+
+def test_a_delay_may_be_unknown_but_for_what_drives_the_model() -> None:
+    topics = mapping_from({"inputs": {"joint_angles": {"delay": "auto"}, "cylinder_pressures": {"delay": "auto"}}}, "mapping")
+    assert topics.lagging == [Stream.ANGLES, Stream.FORCES] and topics.delay(Stream.ANGLES) == 0
+    for delay, told in (("auto", "Give the others auto"), ("often", "seconds .* or auto")):
+        with pytest.raises(UsageError, match=told):
+            mapping_from({"inputs": {"cylinder_strokes": {"delay": delay}}}, "mapping")
+    with pytest.raises(UsageError, match="only IMUs and points have it"):
+        mapping_from({"inputs": {"joint_angles": {"frame_id": "boom"}}}, "mapping")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from recordings import SessionSheet, SessionWriter, read_both, scan
+from recordings import MessageWriter, SessionSheet, read_both, scan
 from ros_messages import TYPES, fill_header, jazzy, load_topics, stamp_of
 
 from boom_twin import Stream, load_scene, replay
@@ -20,7 +20,7 @@ def written(path: Path, delays: dict[Stream, float]) -> Path:
     """The first messages of every topic of the bundled session, their stamps later by `delays`; log times as they were."""
     inputs = {stream: topic for stream, topic in load_topics().inputs.items() if scan(SESSION).find(topic.name) is not None}
     streams = {topic.absolute: stream for stream, topic in inputs.items()}
-    with SessionWriter(path, {stream.value: topic for stream, topic in inputs.items()}, {"origin": "synthetic, a test"}) as bag:
+    with MessageWriter(path, {stream.value: topic for stream, topic in inputs.items()}, {"origin": "synthetic, a test"}) as bag:
         count = dict.fromkeys(Stream, 0)
         for name, log, _, msg in read_both(scan(SESSION), {name: TYPES[stream] for name, stream in streams.items()}):
             stream = streams[name]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
-from recordings import SessionSheet, SessionWriter, read, scan, write_session
+from recordings import MessageWriter, SessionSheet, read, scan, write_session
 from ros_messages import fill_header, load_topics, new_message
 
 from boom_twin import Stream, UsageError, load_scene, replay
@@ -53,7 +53,7 @@ def rig(arrays, tmp_path_factory):
     """The bag of the rig, with its mapping; every fourth message has the angles too."""
     path = tmp_path_factory.mktemp("rig") / "bag"
     topic = load_topics().inputs[Stream.STROKES].model_copy(update={"name": "/rig/joint_states"})
-    with SessionWriter(path, {"all": topic}, {"origin": "synthetic, a test"}) as bag:
+    with MessageWriter(path, {"all": topic}, {"origin": "synthetic, a test"}) as bag:
         for row, (stamp, strokes, angles) in enumerate(zip(*arrays, strict=True)):
             msg = new_message(JOINT_STATE)
             fill_header(msg.header, int(stamp))
@@ -78,11 +78,11 @@ def test_a_recording_is_replayed_with_its_own_mapping(rig, usual, tmp_path):
     found = replay(rig, load_scene(), tmp_path / "out")
     assert found.summary["mapping"] == f"{rig / 'session.yaml'}, mapping"
     assert (found.summary["samples"], found.summary["dropped"], found.summary["events"]) == (ROWS, 0, {})
-    one, other = found.recording.predictions, usual.recording.predictions
+    one, other = found.recording.whole.predictions, usual.recording.whole.predictions
     assert one.stamps.tolist() == other.stamps.tolist()
     np.testing.assert_allclose(one.tip_position, other.tip_position, atol=1e-9)
     np.testing.assert_allclose(one.tip_acceleration, other.tip_acceleration, atol=1e-5)
-    expected, angles = usual.recording.of(Stream.ANGLES), found.recording.of(Stream.ANGLES)
+    expected, angles = usual.recording.whole.of(Stream.ANGLES), found.recording.whole.of(Stream.ANGLES)
     assert len(angles.stamps) == ROWS // EVERY
     rows = np.searchsorted(expected.stamps, angles.stamps)
     assert expected.stamps[rows].tolist() == angles.stamps.tolist()

@@ -52,7 +52,7 @@ def test_the_estimate_knows_it(replayed):
     summary, truth = replayed.summary, load_truth(PUMP_DRIVES)
     assert summary["tip_estimate_error_rms_m"] < 1e-3 < 0.1 * summary["tip_error_rms_m"]
     assert summary["tip_estimate_acceleration_error_rms_m_s2"] < 0.12
-    estimates = replayed.recording.estimates
+    estimates = replayed.recording.whole.estimates
     times = (estimates.stamps - estimates.stamps[0]) * 1e-9 + truth.times[0]
     begun = times > QUIET
     off = (estimates.tip[:, :2] - truth.at(times, truth.position))[begun]
@@ -63,9 +63,9 @@ def test_the_estimate_knows_it(replayed):
 
 def test_residuals_tell_of_the_load(replayed):
     """Angles and forces are farther off once the pump runs; averaged over 1 s, the force of cylinder 1 follows its load."""
-    truth, first = load_truth(PUMP_DRIVES), int(replayed.recording.predictions.stamps[0])
+    truth, first = load_truth(PUMP_DRIVES), int(replayed.recording.whole.predictions.stamps[0])
     for stream in (Stream.ANGLES, Stream.FORCES):
-        rows = replayed.recording.of(stream)
+        rows = replayed.recording.whole.of(stream)
         times = (rows.stamps - first) * 1e-9 + truth.times[0]
         calm, shaken = (np.sqrt(np.nanmean(rows.values[part] ** 2)) for part in (times < QUIET, times > QUIET))
         assert shaken > 1.8 * calm, stream
@@ -80,7 +80,7 @@ def test_lengths_tell_of_the_load(replayed_lengths):
     assert summary["samples"] == 8000 and summary["dropped"] == 0 and summary["alarms"] == []
     assert summary["tip_error_rms_m"] < 1.5e-3 and summary["tip_acceleration_error_rms_m_s2"] < 0.4
     assert summary["tip_estimate_error_rms_m"] < 0.8e-3 and summary["tip_estimate_acceleration_error_rms_m_s2"] < 0.12
-    estimates = replayed_lengths.recording.estimates
+    estimates = replayed_lengths.recording.whole.estimates
     times = (estimates.stamps - estimates.stamps[0]) * 1e-9 + truth.times[0]
     off = (estimates.tip[:, :2] - truth.at(times, truth.position))[times > QUIET]
     assert 0.4 < np.sqrt(np.mean(off**2 / estimates.tip_covariance[times > QUIET][:, [0, 3]])) < 1.6

@@ -57,5 +57,5 @@ def test_the_result_bag_tells_of_the_alarm_and_is_the_same_each_time(result, out
     wanted = {topics[key].absolute: topics[key].type for key in (Output.HEALTH, Output.TIP_UNCERTAINTY)}
     found = list(read(scan(tmp_path / "bag"), wanted))
     told = [message for name, _, message in found if name == topics[Output.HEALTH].absolute]
-    assert len(told) == len(result.recording.health) == len(found) - len(told)
+    assert len(told) == len(result.recording.whole.health) == len(found) - len(told)
     assert "joint_3" in {status.name for status in told[-1].status}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import gzip
 import sys
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +47,8 @@ def table(folder: Path, stretch: int, monkeypatch: pytest.MonkeyPatch) -> tuple[
     """The table of `samples` in stretches of so many predictions, and a recording of the whole."""
     monkeypatch.setattr(recording, "STRETCH", stretch)
     path = folder / "samples.csv"
-    made, found = SampleTable(partial(table_file, path), 4), Recording(4)
+    file, found = table_file(path, columns_of(4)), Recording(4)
+    made = SampleTable(file.write, 4)
     stretches: list[Stretch] = []
 
     def take(each: Stretch) -> None:
@@ -65,6 +65,7 @@ def table(folder: Path, stretch: int, monkeypatch: pytest.MonkeyPatch) -> tuple[
     parts.close()
     assert len(stretches) > 1 or stretch > 2400
     made.finish()
+    file.close()
     return path, found
 
 
@@ -93,7 +94,7 @@ def test_rows_are_what_was_predicted_measured_and_estimated(tmp_path: Path, monk
     for i in range(6):
         assert told[f"estimate_mode_{i + 1}_m"] == pytest.approx(estimates.modes[:, i], rel=1e-8, nan_ok=True)
         assert told[f"estimate_mode_{i + 1}_m_s"] == pytest.approx(estimates.mode_rates[:, i], rel=1e-8, nan_ok=True)
-    innovations = found.of(Stream.STROKES)
+    innovations = found.whole.of(Stream.STROKES)
     assert np.isnan(told["residual_cylinder_2_m"][0]) and len(innovations.stamps) == len(predictions.stamps) - 1
     assert told["residual_cylinder_2_m"][1:] == pytest.approx(innovations.values[:, 1], rel=1e-8)
     given = samples()
@@ -107,7 +108,7 @@ def test_rows_are_what_was_predicted_measured_and_estimated(tmp_path: Path, monk
         assert told[f"measured_joint_{i + 1}_rad"] == pytest.approx(expected[:, i], rel=1e-8, nan_ok=True)
         known = np.isfinite(told[f"residual_joint_{i + 1}_rad"])
         assert known.sum() >= 0.98 * np.isfinite(expected[:, i]).sum() and not (known & np.isnan(expected[:, i])).any()
-    rows = found.of(Stream.IMU)
+    rows = found.whole.of(Stream.IMU)
     assert told["residual_tip_imu_z_m_s2"][np.isin(predictions.stamps, rows.stamps)] == pytest.approx(
         rows.values[:, 1], rel=1e-8
     )

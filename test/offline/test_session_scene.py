@@ -11,7 +11,7 @@ from command import main
 from default_boom import default_text
 from drive_twin import note_drives
 from offline.booms_apart import scene_text, session
-from recordings import SessionSheet, SessionWriter, scan, scene_of
+from recordings import MessageWriter, SessionSheet, scan, scene_of
 from ros_messages import fill_header, load_topics, new_message
 
 from boom_twin import BagError, Settings, Stream, load_scene, replay
@@ -84,7 +84,7 @@ def test_without_its_scene_it_is_refused(five, tmp_path, capsys):
 def write_names(path, names, rows=20):
     """Strokes of the names given, at rest."""
     topic = load_topics().inputs[Stream.STROKES]
-    with SessionWriter(path, {"strokes": topic}) as bag:
+    with MessageWriter(path, {"strokes": topic}) as bag:
         for row in range(rows):
             msg = new_message(topic.type)
             fill_header(msg.header, 10**18 + row * 5_000_000)

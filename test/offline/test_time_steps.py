@@ -16,7 +16,7 @@ from command import main
 from default_boom import joint_angles_of_strokes, strokes_of_posture
 from mcap.reader import make_reader
 from mcap.writer import IndexType, Writer
-from recordings import SessionWriter, read, scan, sensor_message
+from recordings import MessageWriter, read, scan, sensor_message
 from ros_messages import jazzy, load_topics, stamp_of
 
 from boom_twin import Sample, Stream, Twin, load_scene
@@ -42,7 +42,7 @@ def samples(shift: Callable[[int], int] = lambda row: 0, rows: int = ROWS) -> li
 def write(folder: Path, found: list[Sample], logs: list[int] | None = None) -> Path:
     """A bag of samples in their order, with other log times (ns) than their stamps if given."""
     inputs = load_topics().inputs
-    with SessionWriter(folder, {stream.value: inputs[stream] for stream in inputs}, {}) as bag:
+    with MessageWriter(folder, {stream.value: inputs[stream] for stream in inputs}, {}) as bag:
         for sample, log in zip(found, logs or [sample.stamp for sample in found], strict=True):
             bag.write(sample.stream.value, log, sensor_message(sample))
     return folder

@@ -17,7 +17,7 @@ import pytest
 from default_boom import joint_angles_of_strokes, strokes_of_posture
 from demo.isolation import Isolation
 from made_once import MadeOnce
-from recordings import SessionWriter, load_mapping, read_both, scan, write_session
+from recordings import MessageWriter, load_mapping, read_both, scan, write_session
 from ros_messages import load_topics
 
 from boom_twin import load_scene, statics
@@ -238,7 +238,7 @@ def reliable_bag(bag: Path, mapping: Path, tmp_path_factory: pytest.TempPathFact
     """The same, played with the quality of service of `mapping`."""
     path, inputs = tmp_path_factory.mktemp("session") / "bag", load_mapping(mapping).inputs
     topics = {topic.absolute: topic for topic in inputs.values() if scan(bag).find(topic.absolute) is not None}
-    with SessionWriter(path, topics) as writer:
+    with MessageWriter(path, topics) as writer:
         for name, log_time, data, _ in read_both(scan(bag), {name: topic.type for name, topic in topics.items()}):
             writer.write_encoded(name, log_time, data)
     return path

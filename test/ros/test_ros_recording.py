@@ -19,7 +19,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from default_boom import default_text
-from recordings import SessionWriter, read_both, scan
+from recordings import MessageWriter, read_both, scan
 from ros_messages import TYPES, Output, decode_changes, jazzy, load_topics, stamp_of
 from ros_rig import all_stored, published
 from rosbags.highlevel import AnyReader
@@ -177,7 +177,7 @@ def test_a_replay_gives_what_the_node_published(recorded: Path, bag: Path, tmp_p
     }  # none is sent
     topic = TOPICS.outputs[Output.CHANGES]
     changes = {stamp_of(msg): data for *_, data, msg in read_both(scan(recorded), {topic.absolute: topic.type})}
-    with SessionWriter(tmp_path / "bag", TOPICS.inputs | {Output.CHANGES: topic}) as writer:
+    with MessageWriter(tmp_path / "bag", TOPICS.inputs | {Output.CHANGES: topic}) as writer:
         for name, log_time, data, msg in read_both(scan(bag), {name: TYPES[stream] for name, stream in inputs.items()}):
             if inputs[name] is Stream.STROKES and (change := changes.get(stamp_of(msg))):
                 writer.write_encoded(Output.CHANGES, log_time, change)

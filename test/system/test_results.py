@@ -43,9 +43,9 @@ def run(out: Path, content: str, steps: int = -1) -> int:
         for name in CHANGING:
             setattr(os, name, counted(getattr(os, name)))
         with result_folder(out, REPLAY, []) as building:
-            (building.folder / "bag").mkdir()
+            (building / "bag").mkdir()
             for name in FILES:
-                write_atomic(building.folder / name, name + content)
+                write_atomic(building / name, name + content)
         os._exit(0)
     except BaseException:
         traceback.print_exc()
@@ -87,7 +87,7 @@ def test_a_kill_at_any_step_leaves_a_whole_result_or_one_that_says_it_is_not(tmp
 
 def build(out: Path, kind: ResultKind = REPLAY, sources: tuple[Path, ...] = (), name: str = "summary.json") -> None:
     with result_folder(out, kind, sources) as building:
-        write_atomic(building.folder / name, "{}")
+        write_atomic(building / name, "{}")
 
 
 @pytest.mark.system
@@ -203,10 +203,10 @@ def test_a_session_that_could_not_be_put_in_place_is_not_thrown_away(tmp_path: P
     """Its source may be gone by now."""
     told = r"out: holds session_0\.mcap.*The result is whole, and is kept in .*out\.unfinished"
     with pytest.raises(BagError, match=told), result_folder(tmp_path / "out", RECOVER, []) as building:
-        (building.folder / "session_0.mcap").write_text("saved")
+        (building / "session_0.mcap").write_text("saved")
         recording(tmp_path / "out")
     (tmp_path / "out").rename(tmp_path / "moved")
-    with pytest.raises(BagError, match=r"out\.unfinished: holds a whole result of an earlier recover.*Rename it"):
+    with pytest.raises(BagError, match=r"out\.unfinished: holds a whole result of `boom_twin recover`.*Rename it"):
         build(tmp_path / "out", RECOVER, name="session_0.mcap")
     (tmp_path / "out.unfinished").rename(tmp_path / "saved")
     assert (tmp_path / "saved" / "session_0.mcap").read_text() == "saved" and not incompleteness(tmp_path / "saved")

@@ -203,11 +203,11 @@ def test_a_stroke_that_is_lost_for_half_a_second_does_not_move_the_tip(scene, st
 
 
 def test_a_stroke_that_stays_elsewhere_for_a_second_starts_the_model_from_rest_there(twin, still):
-    follow(twin, still, 500)
+    follow(twin, still, 2500)
     elsewhere = moved(still, 1.0) + np.array([0.0, 0.02, 0.0, 0.0])
-    reports = [twin.update(strokes(500 + 5 * k, elsewhere)) for k in range(300)]
+    reports = [twin.update(strokes(2500 + 5 * k, elsewhere)) for k in range(300)]
     (again,) = [report for report in reports if "stroke elsewhere" in report.events]
-    assert again.change.from_rest and again.stamp == START + 1500 * MS
+    assert again.change.from_rest and again.stamp == START + 3500 * MS
     assert is_at_rest(again.prediction) and "implausible" not in reports[-1].events
     assert reports[-1].prediction.strokes == pytest.approx(elsewhere, abs=1e-6)
 

@@ -127,7 +127,9 @@ def test_a_late_stream_and_its_delay(rows: Rows, tmp_path: Path, capsys: pytest.
     found = checked(capsys, bag, "--out", str(out))
     lags = dict(zip(found["lag_streams"], found["lags_s"], strict=True))
     assert lags["joint_angles"] == pytest.approx(0.06, abs=0.003) and abs(lags["tip_imu"]) < 0.005
-    assert yaml.safe_load(out.read_text()) == {"inputs": {"joint_angles": {"delay": pytest.approx(0.06, abs=0.003)}}}
+    assert yaml.safe_load(out.read_text()) == {"inputs": {"joint_angles": {"delay": "auto"}}}
+    late = rows.stamps + 150_000_000  # more than the twin itself finds
+    assert "delay: 0.1" in checked(capsys, written(rows, tmp_path / "later", angle_stamps_ns=late))["mapping"]
 
 
 @pytest.mark.parametrize("stream", [Stream.IMU, Stream.IMU_2])

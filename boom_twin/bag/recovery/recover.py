@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, ChunkIndex, DataEnd, Header, Metadata, Schema, Statistics
+from mcap.records import Channel, DataEnd, Header, Metadata, Schema, Statistics
 
 from ...config.yaml_text import LARGEST_FILE
 from ...errors import BagError
@@ -26,34 +26,17 @@ from ..storages import SUMMARISE
 from ..writer import BagWriter
 from .scanner import DamagedBytes, SoundRecords, scan_damaged
 
-_DEFINITIONS = {Opcode.CHANNEL, Opcode.SCHEMA}
-_NOTES = {Opcode.HEADER, Opcode.METADATA, Opcode.DATA_END}
-_INDEXES = {Opcode.STATISTICS, Opcode.CHUNK_INDEX}
-
 
 @dataclass(slots=True)
 class FileDefinitions:
-    """Definitions, notes and counts of one damaged file.
+    """Definitions, notes and counts of one damaged file."""
 
-    Attributes
-    ----------
-    channels, schemas : dict
-        Channels and schemas by number; a definition under a checksum replaces one without.
-    notes : dict of str to str
-    told : Counter or None
-        Number of messages by topic from a sound summary.
-    is_summed : bool
-        True if the checksum of all bytes up to the end of the data fits.
-    listed : Counter of (int, int, int)
-        Chunks in a sound summary's index, by first and last log time (ns) and content size.
-    """
-
+    # channels, schemas: by number; a definition under a checksum replaces one without
     channels: dict[int, Channel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
-    told: Counter[str] | None = None
-    is_summed: bool = False
-    listed: Counter[tuple[int, int, int]] = field(default_factory=Counter)
+    told: Counter[str] | None = None  # number of messages by topic from a sound summary
+    is_summed: bool = False  # True if the checksum of all bytes up to the end of the data fits
 
     def topic(self, channel: int, metadata: BagMetadata | None) -> Recorded | None:
         """Return the topic of a channel; None if its definition is lost."""
@@ -87,7 +70,7 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
     BagError
         The profile is ros1 or px4, or definitions exceed `LARGEST_SUMMARY`.
     """
-    definitions, unvouched = FileDefinitions(), FileDefinitions()
+    found, sure = FileDefinitions(), set[tuple[int, int]]()
     statistics: Statistics | None = None
     summary = summary_start(path)
     budget, is_data = LARGEST_SUMMARY, True
@@ -95,74 +78,52 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
         if not isinstance(piece, SoundRecords):
             continue
         is_in_summary = summary is not None and piece.offset >= summary
-        target = definitions if piece.vouched or is_in_summary else unvouched
-        others = _NOTES | _INDEXES if is_in_summary else _NOTES
+        is_sure = piece.vouched or is_in_summary
         for opcode, body in parts(piece.content):
-            if opcode in _DEFINITIONS and (target is definitions or is_data):
+            if opcode in (Opcode.CHANNEL, Opcode.SCHEMA) and (is_sure or is_data):
                 budget -= len(body)
                 if budget < 0:
                     raise BagError(
                         f"{path}: more than {LARGEST_SUMMARY} bytes of definitions. It is not the work of a recorder."
                     )
-            elif opcode not in others:
-                continue
-            match record_of(opcode, body):
-                case Channel() as channel:
-                    target.channels.setdefault(channel.id, channel)
-                case Schema() as schema:
-                    target.schemas.setdefault(schema.id, schema)
-                case Header(profile=("ros1" | "px4") as profile):
-                    raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system.")
-                case Metadata(name=name, metadata=notes) if name == NOTES:
-                    definitions.notes |= notes
-                case DataEnd(data_section_crc=checksum):
-                    is_data = False
-                    with open_received(path) as file:
-                        definitions.is_summed = checksum != 0 and checksum == checksum_of(file, 0, piece.offset)
-                case Statistics() as found:
-                    statistics = found
-                case ChunkIndex() as index:
-                    definitions.listed[index.message_start_time, index.message_end_time, index.uncompressed_size] += 1
-    definitions.channels = {**unvouched.channels, **definitions.channels}
-    definitions.schemas = {**unvouched.schemas, **definitions.schemas}
-    if statistics is not None and statistics.channel_message_counts.keys() <= definitions.channels.keys():
-        definitions.told = by_topic(statistics.channel_message_counts, definitions.channels)
-    return definitions
+                definition = record_of(opcode, body)
+                assert isinstance(definition, Channel | Schema)
+                table: dict[int, Any] = found.channels if opcode == Opcode.CHANNEL else found.schemas
+                if definition.id not in table or (is_sure and (opcode, definition.id) not in sure):
+                    table[definition.id] = definition
+                if is_sure:
+                    sure.add((opcode, definition.id))
+            elif opcode in (Opcode.HEADER, Opcode.METADATA, Opcode.DATA_END) or (opcode == Opcode.STATISTICS and is_in_summary):
+                match record_of(opcode, body):
+                    case Header(profile=("ros1" | "px4") as profile):
+                        raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system.")
+                    case Metadata(name=name, metadata=notes) if name == NOTES:
+                        found.notes |= notes
+                    case DataEnd(data_section_crc=checksum):
+                        is_data = False
+                        with open_received(path) as file:
+                            found.is_summed = checksum != 0 and checksum == checksum_of(file, 0, piece.offset)
+                    case Statistics() as counts:
+                        statistics = counts
+    if statistics is not None and statistics.channel_message_counts.keys() <= found.channels.keys():
+        found.told = by_topic(statistics.channel_message_counts, found.channels)
+    return found
 
 
-MOST_FAULTS = 1000
-"""Limit for the number of faults that are reported one by one."""
+MOST_FAULTS = 1000  # limit for the number of faults that are reported one by one
 
 
 @dataclass(slots=True)
 class Recovery:
-    """Result of a recovery: counts of saved and lost messages, and faults.
+    """Result of a recovery: counts of saved and lost messages, and faults."""
 
-    Attributes
-    ----------
-    saved : Counter
-        Number of messages by topic, counted in the new session after it was written.
-    unvouched : Counter
-        Number of saved messages by topic that were under no checksum.
-    lost : dict of str to int, or None
-        Number of lost messages by topic; None if the source has no sound count.
-    nameless : int
-        Number of sound messages left out because the definition of their topic is lost.
-    copies : int
-        Number of messages left out because their chunk is a copy of an earlier one.
-    faults : list of (Path, Fault)
-        The first `MOST_FAULTS` faults.
-    fault_count : int
-        Number of all faults.
-    """
-
+    # number of messages by topic, counted in the new session after it was written
     saved: Counter[str] = field(default_factory=Counter)
-    unvouched: Counter[str] = field(default_factory=Counter)
-    lost: dict[str, int] | None = None
-    nameless: int = 0
-    copies: int = 0
-    faults: list[tuple[Path, DamagedBytes]] = field(default_factory=list)
-    fault_count: int = 0
+    unvouched: Counter[str] = field(default_factory=Counter)  # number of saved messages by topic that were under no checksum
+    lost: dict[str, int] | None = None  # number of lost messages by topic; None if the source has no sound count
+    nameless: int = 0  # number of sound messages left out because the definition of their topic is lost
+    faults: list[tuple[Path, DamagedBytes]] = field(default_factory=list)  # the first `MOST_FAULTS` faults
+    fault_count: int = 0  # number of all faults
 
     def note(self, path: Path, fault: DamagedBytes) -> None:
         """Count a fault, and keep it if it is among the first `MOST_FAULTS`."""
@@ -176,7 +137,6 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Recovery:
 
     Parameters
     ----------
-    path, out : Path
     unverified : bool
         Also save the whole messages at the start of chunks that are cut off or whose checksum does not fit.
 
@@ -191,7 +151,7 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Recovery:
         There is no session, nothing of it can be saved, or `out` cannot be written or lies in the source.
     """
     with result_folder(out, RECOVER, [path]) as building:
-        return _recover(path, building.folder, unverified)
+        return _recover(path, building, unverified)
 
 
 def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
@@ -222,7 +182,7 @@ def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
     if not bag.counts.total():
         raise BagError(f"{path}: nothing can be saved: {_first(outcome)}.")
     _copy_sheet(path, out)
-    outcome.saved = _count(out)
+    outcome.saved = Counter({topic.name: topic.count for topic in scan(out).topics})
     outcome.lost = _lost(outcome.saved, all_definitions, metadata, files)
     return outcome
 
@@ -236,15 +196,11 @@ def _copy(
     metadata: BagMetadata | None,
     unverified: bool,
 ) -> None:
-    """Copy the messages of one file. Chunks that are copies of earlier ones are left out."""
+    """Copy the messages of one file."""
     own: dict[int, int] = {}
-    seen: Counter[bytes] = Counter()
     for piece in scan_damaged(file, unverified, definitions.channels):
         if isinstance(piece, DamagedBytes):
             outcome.note(file, piece)
-            continue
-        if _is_copy(piece, definitions, seen):
-            outcome.copies += sum(opcode == Opcode.MESSAGE for opcode, _ in parts(piece.content))
             continue
         for opcode, body in parts(piece.content):
             if opcode != Opcode.MESSAGE:
@@ -265,20 +221,6 @@ def _copy(
                 outcome.unvouched[bag.topics[key].topic] += 1
 
 
-def _is_copy(piece: SoundRecords, definitions: FileDefinitions, seen: Counter[bytes]) -> bool:
-    """Return True if a piece is a chunk that was `seen` more often than the recorder wrote it.
-
-    Equal messages within one chunk are recorded ones. Equal chunks, as from a clock that stands still, are recorded
-    ones if the checksum of all data fits. Otherwise a sound index gives the number of recorded ones.
-    """
-    chunk = piece.chunk
-    if chunk is None or definitions.is_summed:
-        return False
-    digest = sha256(piece.content).digest()
-    seen[digest] += 1
-    return seen[digest] > max(1, definitions.listed[chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size])
-
-
 def _copy_sheet(path: Path, out: Path) -> None:
     """Copy ``session.yaml``, whose scene and mapping a replay needs."""
     sheet = sheet_path(path)
@@ -287,34 +229,21 @@ def _copy_sheet(path: Path, out: Path) -> None:
             write_atomic(out / sheet.name, file.read(LARGEST_FILE))
 
 
-def _count(out: Path) -> Counter[str]:
-    """Return the number of messages by topic, counted by reading all of the new session."""
-    saved: Counter[str] = Counter()
-    for file in scan(out).files:
-        for channel, _, _ in file.heads():
-            saved[file.channels[channel].topic] += 1
-    return saved
-
-
 def _lost(
     saved: Mapping[str, int], all_definitions: list[FileDefinitions], metadata: BagMetadata | None, files: list[Path]
 ) -> dict[str, int] | None:
-    """Return the lost messages by topic against the first count of the source that is no smaller than the saved messages."""
-    for told in _counts_told(all_definitions, metadata, files):
-        if all(told.get(topic, 0) >= count for topic, count in saved.items()):
-            return {topic: told[topic] - saved.get(topic, 0) for topic in told}
-    return None
+    """Return the lost messages by topic against the first count of the source that is no smaller than the saved messages.
 
-
-def _counts_told(
-    all_definitions: list[FileDefinitions], metadata: BagMetadata | None, files: list[Path]
-) -> Iterator[Counter[str]]:
-    """Yield the counts of the files' summaries, if all have one, and of the metadata, if it names all files."""
-    counts = [definitions.told for definitions in all_definitions]
-    if None not in counts:
-        yield sum((each for each in counts if each is not None), Counter[str]())
+    A count is that of the files' summaries, if all have one, or of the metadata, if it names all files.
+    """
+    told = [each.told for each in all_definitions if each.told is not None]
+    counts = [sum(told, Counter[str]())] if len(told) == len(files) else []
     if metadata is not None and {file.name for file in files} <= set(metadata.file_names):
-        yield metadata.counts
+        counts.append(metadata.counts)
+    for count in counts:
+        if all(count.get(topic, 0) >= found for topic, found in saved.items()):
+            return {topic: count[topic] - saved.get(topic, 0) for topic in count}
+    return None
 
 
 def _first(outcome: Recovery) -> str:

@@ -39,22 +39,11 @@ _SIZE = struct.Struct("<Q")
 
 @dataclass(frozen=True, slots=True)
 class SoundRecords:
-    """Whole records that follow each other.
-
-    Attributes
-    ----------
-    offset : int
-    vouched : bool
-        True if the checksum of their chunk fits.
-    content : bytes
-    chunk : Chunk or None
-        Their chunk, if the records are its whole content.
-    """
+    """Whole records that follow each other."""
 
     offset: int
-    vouched: bool
+    vouched: bool  # True if the checksum of their chunk fits
     content: bytes
-    chunk: Chunk | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +62,6 @@ def scan_damaged(
 
     Parameters
     ----------
-    path : Path
     unverified : bool
         Also yield the whole records at the start of a chunk whose checksum does not fit or cannot be verified.
     channels : container of int, optional
@@ -127,7 +115,7 @@ def _chunk_pieces(
         if chunk.uncompressed_crc == 0:
             for _ in bounds(content):  # refuses records that are not whole
                 pass
-        yield SoundRecords(offset, chunk.uncompressed_crc != 0, content, chunk)
+        yield SoundRecords(offset, chunk.uncompressed_crc != 0, content)
         return
     except PARSE_ERRORS as error:
         reason = str(error)
@@ -148,14 +136,14 @@ def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:
     if len(raw) < PREFIX.size:
         return b""
     opcode, length = PREFIX.unpack(raw)
-    if length > min(MOST_HELD, size - offset - PREFIX.size):
+    end = offset + PREFIX.size + length
+    if end > size or length > MOST_HELD or (opcode != Opcode.MESSAGE and opcode not in KINDS):
         return b""
-    body = file.read(length)
-    if opcode == Opcode.MESSAGE:
-        is_whole = length >= MESSAGE_HEAD.size and _may_begin(file, offset + PREFIX.size + length, size)
-    else:
-        is_whole = opcode in KINDS and _fills(opcode, body)
-    return raw + body if is_whole else b""
+    if opcode == Opcode.MESSAGE and (length < MESSAGE_HEAD.size or not _may_begin(file, end, size)):
+        return b""
+    file.seek(offset)
+    record = file.read(PREFIX.size + length)
+    return record if opcode == Opcode.MESSAGE or _fills(opcode, record[PREFIX.size :]) else b""
 
 
 def _fills(opcode: int, body: bytes) -> bool:
@@ -197,14 +185,9 @@ def _behind(file: BinaryIO, offset: int, size: int, channels: Container[int]) ->
 
 def _is_start(file: BinaryIO, offset: int, size: int, channels: Container[int]) -> bool:
     """Return True if a chunk, the end of the data, or a known channel's message followed by a record is at `offset`."""
+    file.seek(offset + PREFIX.size)
+    channel = file.read(2)
     file.seek(offset)
-    raw = file.read(PREFIX.size + MESSAGE_HEAD.size)
-    opcode, length = PREFIX.unpack_from(raw)
-    if opcode == Opcode.CHUNK:
-        return _chunk_length(file, offset) is not None
-    if opcode == Opcode.DATA_END:
-        return bool(length == 4)
-    if length < MESSAGE_HEAD.size or len(raw) < PREFIX.size + MESSAGE_HEAD.size or offset + length > size:
+    if file.read(1)[0] == Opcode.MESSAGE and int.from_bytes(channel, "little") not in channels:
         return False
-    channel = MESSAGE_HEAD.unpack_from(raw, PREFIX.size)[0]
-    return channel in channels and _may_begin(file, offset + PREFIX.size + length, size)
+    return _chunk_length(file, offset) is not None or bool(_whole_record(file, offset, size))

@@ -43,39 +43,31 @@ PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD_END_PIN, BARREL_END_PIN = map(np.int64
 
 
 class Journal(NamedTuple):
-    """Position and velocity of a journal in its bush.
+    """Position and velocity of a journal in its bush."""
 
-    x, y : offset, m. vx, vy : velocity, m/s. before_x, before_y : velocity at the start of the step, m/s.
-    turning : angular velocity of the journal in the bush, rad/s. axis_x, axis_y : first axis of the body with the seat.
-    """
-
-    x: float
+    x: float  # offset, m
     y: float
-    vx: float
+    vx: float  # velocity, m/s
     vy: float
-    before_x: float
+    before_x: float  # velocity at the start of the step, m/s
     before_y: float
-    turning: float
-    axis_x: float
+    turning: float  # angular velocity of the journal in the bush, rad/s
+    axis_x: float  # first axis of the body with the seat
     axis_y: float
 
 
 class PinForce(NamedTuple):
-    """Contact force and friction torque on a journal, and their derivatives.
+    """Contact force and friction torque on a journal, and their derivatives."""
 
-    x, y : force, N. xx, xy, yy : tangent by the offset, N/m. torque : friction torque, N m.
-    torque_x, torque_y, torque_turn : derivatives of the torque by offset (N) and by angle (N m).
-    """
-
-    x: float
+    x: float  # force, N
     y: float
-    xx: float
+    xx: float  # tangent by the offset, N/m, as the next two
     xy: float
     yy: float
-    torque: float
-    torque_x: float
+    torque: float  # of friction, N m
+    torque_x: float  # derivatives of the torque by offset, N
     torque_y: float
-    torque_turn: float
+    torque_turn: float  # by angle, N m
 
 
 # Columns of `Work.hold`, a `PinForce` for every pin.

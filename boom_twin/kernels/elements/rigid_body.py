@@ -11,19 +11,15 @@ from ..jit import inner
 
 
 @inner
-def pull_back_force(p, x_of, y_of, bx, by):
-    """`pull_back` of forces alone."""
-    p[2] += bx * p[y_of] - by * p[x_of]
-
-
-@inner
-def pull_back(s, p, m, x_of, y_of, bx, by):
+def pull_back(s, p, m, x_of, y_of, bx, by, renew):
     """Let slots x_of, y_of be a point at (bx, by) from the frame in slots 0..2: add what it does to slot 2, turning.
 
-    Congruence with T = 1 + (-by e_x + bx e_y) e_theta^T, and the second derivative of the point.
+    Congruence with T = 1 + (-by e_x + bx e_y) e_theta^T, and the second derivative of the point; only forces unless `renew`.
     """
     bend = bx * p[x_of] + by * p[y_of]
-    pull_back_force(p, x_of, y_of, bx, by)
+    p[2] += bx * p[y_of] - by * p[x_of]
+    if not renew:
+        return
     for i in range(m):
         s[i, 2] += bx * s[i, y_of] - by * s[i, x_of]
     for i in range(m):
@@ -53,32 +49,21 @@ def add_body_tangent(s, mass, inertia, dx, dy, fx, fy, gain):
 
 
 @inner
-def merge_outlet_force(p, m, bx, by):
-    """`merge_outlet` of forces alone."""
-    pull_back_force(p, 3, 4, bx, by)
-    close_force_gap(p, m)
-
-
-@inner
-def close_force_gap(p, m):
-    """Add slots 3, 4 to 0, 1, and let those behind move up."""
+def merge_outlet(s, p, m, bx, by, renew):
+    """Slots 3, 4 are a point at (bx, by) of the frame: fold them into slots 0..2 and close the gap; forces unless `renew`."""
+    pull_back(s, p, m, 3, 4, bx, by, renew)
     p[0] += p[3]
     p[1] += p[4]
     for i in range(5, m):
         p[i - 2] = p[i]
-
-
-@inner
-def merge_outlet(s, p, m, bx, by):
-    """Slots 3, 4 are a point at (bx, by) of the frame: fold them into slots 0..2 and close the gap."""
-    pull_back(s, p, m, 3, 4, bx, by)
+    if not renew:
+        return
     for i in range(m):
         s[i, 0] += s[i, 3]
         s[i, 1] += s[i, 4]
     for i in range(m):
         s[0, i] += s[3, i]
         s[1, i] += s[4, i]
-    close_force_gap(p, m)
     for i in range(5, m):
         for j in range(m):
             s[i - 2, j] = s[i, j]

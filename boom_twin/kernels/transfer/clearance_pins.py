@@ -77,20 +77,25 @@ def set_turn(t, work, owner, place, angle):
 
 
 @inner
+def force_of_pin(t, state, k, position, rate, offset):
+    """Return the `PinForce` of pin `k`, whose velocities are v = rate x + offset; `position` has the angles of journals."""
+    row, before = t.clearances[k], state.history[V]
+    x, y, turning = state.z[row.z], state.z[row.z + 1], 0.0
+    vx, vy = rate * x + offset[row.z], rate * y + offset[row.z + 1]
+    if row.friction > 0.0:
+        turning = rate * position[row.turn] + offset[row.turn]
+    ax, ay = axis_of(t, state, row)
+    journal = Journal(
+        x=x, y=y, vx=vx, vy=vy, before_x=before[row.z], before_y=before[row.z + 1], turning=turning, axis_x=ax, axis_y=ay
+    )
+    return pin_force(row, state.contacts[k], journal, rate)
+
+
+@inner
 def load_pins(t, state, work, motion):
     """Force, tangent and torque of every pin with clearance into `work.hold`."""
-    before = state.history[V]
     for k in range(t.clearances.shape[0]):
-        row, hold = t.clearances[k], work.hold[k]
-        x, y, turning = state.z[row.z], state.z[row.z + 1], 0.0
-        vx, vy = motion.rate * x + motion.offset[row.z], motion.rate * y + motion.offset[row.z + 1]
-        if row.friction > 0.0:
-            turning = motion.rate * work.position[row.turn] + motion.offset[row.turn]
-        ax, ay = axis_of(t, state, row)
-        journal = Journal(
-            x=x, y=y, vx=vx, vy=vy, before_x=before[row.z], before_y=before[row.z + 1], turning=turning, axis_x=ax, axis_y=ay
-        )
-        found = pin_force(row, state.contacts[k], journal, motion.rate)
+        hold, found = work.hold[k], force_of_pin(t, state, k, work.position, motion.rate, motion.offset)
         hold[HOLD_X], hold[HOLD_Y], hold[K_XX], hold[K_XY], hold[K_YY] = found.x, found.y, found.xx, found.xy, found.yy
         hold[TORQUE], hold[TORQUE_X], hold[TORQUE_Y] = found.torque, found.torque_x, found.torque_y
         hold[TORQUE_TURN] = found.torque_turn

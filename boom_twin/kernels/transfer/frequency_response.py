@@ -25,37 +25,18 @@ TIP_FORCE = np.int64(2)  # number of leading load entries for the tip force; the
 
 @kernel
 def harmonic_response(t, state, work, drive, rates, loads, pins, increments, tip):
-    """Compute complex amplitudes of all unknowns and of the tip under harmonic loads about a state at rest.
+    """Write complex amplitudes of all unknowns and of the tip under harmonic loads about a state at rest.
 
-    With ideal pins the response is linear in the load. Use a large load to reduce rounding by the static forces.
+    With ideal pins the response is linear in the load; a large load reduces rounding by the static forces. With clearance the
+    tangents are recomputed under the load and depend on it. Use a load that is small against the static forces. The linear
+    response is half the difference between the responses to the load and to its opposite.
 
-    With clearance the tangents are recomputed under the load and depend on it. Use a load that is small against the static
-    forces. The linear response is half the difference between the responses to the load and to its opposite.
+    `state` is in equilibrium and placed in `work`, which `kernels.tables.complex_scratch` made. `drive` (n,) are its drive
+    lengths, m; `rates` (k,) are s = i omega, 1/s; `loads` (k, 2 + n) the force at the tip in x and y (N), then the drive of
+    every cylinder (m). `pins` (2, pins, HOLD_COLUMNS) are `Work.hold` of the journals at rest, and its derivative by s.
+    `increments` (k, unknowns) and `tip` (k, 3), x, y (m) and orientation (rad), are written.
 
-    Parameters
-    ----------
-    t : Tables
-    state : State
-        State in equilibrium, already placed in `work`.
-    work : Work
-        Made by `kernels.tables.complex_scratch`.
-    drive : ndarray, shape (n,)
-        Drive lengths of the state, m.
-    rates : ndarray of complex, shape (k,)
-        s = i omega, 1/s.
-    loads : ndarray of complex, shape (k, 2 + n)
-        Amplitudes: force at the tip in x and y (N), then the drive of every cylinder (m).
-    pins : ndarray, shape (2, pins with clearance, HOLD_COLUMNS)
-        `Work.hold` of the journals at rest, and its derivative by s.
-    increments : ndarray of complex, shape (k, unknowns)
-        Written, in the units of the unknowns.
-    tip : ndarray of complex, shape (k, 3)
-        Written: x, y (m), orientation (rad).
-
-    Returns
-    -------
-    status, row : int
-        OK, or SINGULAR at `rates[row]`.
+    Return status and row: OK, or SINGULAR at `rates[row]`.
     """
     operations = t.operations.shape[0]
     loaded = np.bool_(pins.shape[1] > 0)

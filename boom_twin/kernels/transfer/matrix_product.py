@@ -27,24 +27,17 @@ THREE, FIVE, SIX, SEVEN = np.int64(3), np.int64(5), np.int64(6), np.int64(7)
 
 
 class Product(NamedTuple):
-    """Working arrays of the plain product for a boom of k units.
+    """Working arrays of the plain product for a boom of k units."""
 
-    bounds : (k + 1,) first operation of each unit, and the end.
-    u : (k, 6, 7) transfer matrices; that of the first unit, substructure A, is not used.
-    force : (k, 3) force and torque at the output of every unit after the last pass, N and N m.
-    total, other : (6, 7), a, right, order : scratch.
-    z : (7,) state vector in the first 6 entries.
-    """
-
-    bounds: np.ndarray
-    u: Array
-    force: Array
-    total: Array
+    bounds: np.ndarray  # (k + 1,), first operation of each unit, and the end
+    u: Array  # (k, 6, 7), transfer matrices; that of the first unit, substructure A, is not used
+    force: Array  # (k, 3), force and torque at the output of every unit after the last pass, N and N m
+    total: Array  # (6, 7), scratch like the next four
     other: Array
     a: Array
     right: Array
     order: np.ndarray
-    z: Array
+    z: Array  # (7,), state vector in the first 6 entries
 
 
 def new_product(t: Tables) -> Product:

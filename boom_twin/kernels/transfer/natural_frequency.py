@@ -24,19 +24,11 @@ LARGE = 0.64  # of the largest entry beside the diagonal, from which on one of t
 
 @kernel
 def count_below(t, state, work, position, drive, still, omega, scratch):
-    """Frequencies below `omega` (rad/s), plus forces among the unknowns, of a boom that was placed.
+    """Count frequencies below `omega` (rad/s), plus forces among the unknowns, of a boom that was placed.
 
-    position, drive : (histories,), (n,)
-        Of its equilibrium, m.
-    still : (histories,)
-        Zeros.
-    scratch : (inner + 1, inner)
-        One row more than a joint's block has.
-
-    Returns
-    -------
-    status, count, omega : int, int, float
-        At the frequency that was counted for; a count of `NOT_COUNTED` if the stiffness is not finite.
+    `position` (histories,) and `drive` (n,) are of its equilibrium, m; `still` (histories,) zeros; `scratch` (inner + 1,
+    inner) has one row more than a joint's block. Return status, count and the frequency that was counted for; the count is
+    `NOT_COUNTED` if the stiffness is not finite.
     """
     status = OK
     for _ in range(TRIES):
@@ -65,10 +57,8 @@ def condense(t, state, work, motion, drive, still):
 def bisect_frequency(t, state, work, position, drive, still, base, number, low, width, scratch):
     """Return the frequency (rad/s), above `low`, at which `count_below`, less `base`, rises from at most `number` to more.
 
-    Returns
-    -------
-    status, count, omega : int, int, float
-        As `count_below`; of the middle of the last bracket, which is `width` of its upper end wide.
+    Status, count and omega as of `count_below`; omega is the middle of the last bracket, which is `width` of its upper end
+    wide.
     """
     place(t, state, work)
     high = max(2.0 * low, 1.0)

@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..elements.beam import USUAL, USUAL_LOCAL, BeamEquations, Sizes, is_usual, transfer_beam
+from ..elements.beam import USUAL, Sizes, is_usual
+from ..elements.beam_equations import USUAL_LOCAL, BeamEquations, transfer_beam
 from ..elements.pin_contact import BARREL_END_PIN
-from ..elements.rigid_body import (
-    add_body_force,
-    add_body_tangent,
-    merge_outlet,
-    merge_outlet_force,
-    pull_back,
-    pull_back_force,
-)
+from ..elements.rigid_body import add_body_force, add_body_tangent, merge_outlet, pull_back
 from ..jit import inner, kernel
 from ..tables import (
     BEAM,
@@ -78,13 +72,8 @@ def clear_cut(work, m):
 def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m, condensed):
     """Transfer the cut in `work` (m degrees of freedom) inwards, from the end of operation `last - 1` through `first`.
 
-    condensed : Condensed
-        Output for `sweep_out`, `clearance_pins.coarseness` and the count of natural frequencies.
-
-    Returns
-    -------
-    status, negative, m : int
-        OK or SINGULAR; negative pivots of the beams (joints: see `Condensed.blocks`); the cut's new degrees of freedom.
+    `condensed` is written for `sweep_out`, `clearance_pins.coarseness` and the count of natural frequencies. Return status
+    (OK or SINGULAR), negative pivots of the beams (joints: see `Condensed.blocks`), and the cut's new degrees of freedom.
     """
     s, p, negative = work.s, work.p, 0
     for k in range(last - 1, first - 1, -1):
@@ -99,17 +88,11 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m, condense
         elif kind == OFFSET:
             bx, by = t.offsets[row].x, t.offsets[row].y
             ex, ey = c * bx - sn * by, sn * bx + c * by
-            if motion.renew:
-                pull_back(s, p, m, 0, 1, ex, ey)
-            else:
-                pull_back_force(p, 0, 1, ex, ey)
+            pull_back(s, p, m, 0, 1, ex, ey, motion.renew)
         elif kind == STATION:
             bx, by = t.outlets[row].x, t.outlets[row].y
             ex, ey = c * bx - sn * by, sn * bx + c * by
-            if motion.renew:
-                merge_outlet(s, p, m, ex, ey)
-            else:
-                merge_outlet_force(p, m, ex, ey)
+            merge_outlet(s, p, m, ex, ey, motion.renew)
             m -= 2
             p[2] -= torque_of(t, work, t.cylinders[t.outlets[row].cylinder], BARREL_END_PIN)
         elif kind == ROD_PIN:

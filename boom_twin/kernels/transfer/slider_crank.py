@@ -98,19 +98,12 @@ def close_base(t, work, condensed, renew, operation):
     s, p, b, joint = work.s, work.p, work.right, t.joints[0]
     a, order, offsets = condensed.factors[operation], condensed.order[operation], 2 * joint.clearances
     size = 2 + offsets + t.hinges.shape[0]
-    if not renew:
-        for i in range(size):
-            b[i, 0] = p[slot_of(i, offsets)]
-        substitute(a, order, b, size, 1)
-        for i in range(size):
-            condensed.free[operation, i] = b[i, 0]
-        return True
     for i in range(size):
         of = slot_of(i, offsets)
         b[i, 0] = p[of]
-        for j in range(size):
+        for j in range(size if renew else 0):
             a[i, j] = s[of, slot_of(j, offsets)]
-    if joint.clearances:
+    if joint.clearances:  # tangents are then new in every pass
         hold = work.hold[joint.first_clearance]
         b[0, 0] += hold[TORQUE]
         b[2, 0] += hold[HOLD_X]
@@ -132,11 +125,12 @@ def close_base(t, work, condensed, renew, operation):
             for i in range(2):
                 a[turn, 2 + i] -= hold[TORQUE_X + i]
                 a[2 + i, turn] -= hold[TORQUE_X + i]
-    for i in range(size):
-        for j in range(size):
-            condensed.blocks[0, i, j] = a[i, j]
-    if not factorise(a, size, order):
-        return False
+    if renew:
+        for i in range(size):
+            for j in range(size):
+                condensed.blocks[0, i, j] = a[i, j]
+        if not factorise(a, size, order):
+            return False
     substitute(a, order, b, size, 1)
     for i in range(size):
         condensed.free[operation, i] = b[i, 0]

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from ..elements.pin_contact import CLOSED, Journal, pin_force
+from ..elements.pin_contact import CLOSED
 from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
 from ..jit import inner, kernel
 from ..result_row import results_in
 from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion
-from .clearance_pins import axis_of, coarseness, load_pins, note_contacts, shorten
+from .clearance_pins import coarseness, force_of_pin, load_pins, note_contacts, shorten
 from .forward_kinematics import place
 from .kept_tangent import (
     correct_guess,
@@ -36,31 +36,19 @@ LONGEST_INCREMENT = 0.5  # rad, limit of the increments in one pass of a time st
 
 @kernel
 def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product, keep):
-    """Step the boom to drive lengths (m) and rates (m/s), both shape (n,), at the instant that `scheme` solves for.
+    """Step the boom to drive lengths (m) and rates (m/s), both (n,), at the instant that `scheme` solves for.
 
     Newton passes on exact kinematics: place, sweep in, sweep out, until the increments are small. Where journals with
-    clearance hit their bushes the step is divided, so that impacts are resolved.
+    clearance hit their bushes the step is divided, so that impacts are resolved. `REST` as scheme gives static equilibrium
+    near the positions of the history.
 
-    Parameters
-    ----------
-    scheme : Scheme
-        See `kernels.integrators`; `REST` gives static equilibrium near the positions of the history.
-    tolerance : float
-        Largest increment (rad) at convergence. Convergence is quadratic, so the remaining error is about its square.
-    passes : int
-        Largest number of passes. A single pass is the papers' linearised step and counts as converged.
-    longest : float
-        Limit (rad) to which the increments of a pass are scaled down.
-    product : Product or None
-        None for the Riccati form; else working arrays of `kernels.transfer.matrix_product`.
-    keep : bool
-        True if this step continues the last one in `work` and may use its tangent, see `kernels.transfer.kept_tangent`. It
-        requires ideal pins and the Riccati form.
+    `tolerance` is the largest increment (rad) at convergence, which is quadratic: the remaining error is about its square.
+    `passes` is their largest number; a single pass is the papers' linearised step and counts as converged. Increments of a
+    pass are scaled down to `longest` (rad). `product`, of `kernels.transfer.matrix_product`, replaces the Riccati form unless
+    it is None. `keep`, for ideal pins and the Riccati form: this step continues the last one in `work` and may use its
+    tangent, see `kept_tangent`.
 
-    Returns
-    -------
-    status, passes, last increment (rad)
-        After a failure the histories are those of the last complete sub-step.
+    Return status, passes, and last increment (rad). After a failure the histories are those of the last complete sub-step.
     """
     history, operations, done, total, size = state.history, t.operations.shape[0], 0, 0, 0.0
     condensed = work.condensed
@@ -229,53 +217,24 @@ def observe(t, state, out):
     for j in range(3):
         found.tip[0, j], found.tip[1, j] = state.history[X, t.tip + j], state.history[V, t.tip + j]
         found.tip[2, j] = state.history[A, t.tip + j]
-    observe_pins(t, state, found.pins)
-
-
-@inner
-def observe_pins(t, state, out):
-    """Write offset of the journal (m), force (N), and 1 if it touches, for every pin with clearance; shape (pins, 4)."""
-    v = state.history[V]
     for k in range(t.clearances.shape[0]):
-        row, memory = t.clearances[k], state.contacts[k]
-        x, y, vx, vy, turning = state.z[row.z], state.z[row.z + 1], v[row.z], v[row.z + 1], 0.0
-        if row.friction > 0.0:
-            turning = v[row.turn]
-        ax, ay = axis_of(t, state, row)
-        journal = Journal(x=x, y=y, vx=vx, vy=vy, before_x=vx, before_y=vy, turning=turning, axis_x=ax, axis_y=ay)
-        hold = pin_force(row, memory, journal, 0.0)
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x, y, math.hypot(hold.x, hold.y), memory[CLOSED]
+        at, hold = t.clearances[k].z, force_of_pin(t, state, k, state.history[X], 0.0, state.history[V])
+        found.pins[k, 0], found.pins[k, 1] = state.z[at], state.z[at + 1]
+        found.pins[k, 2], found.pins[k, 3] = math.hypot(hold.x, hold.y), state.contacts[k, CLOSED]
 
 
 @kernel
 def run(t, state, work, steps, counts, drives, rates, loads, family, parameter, tolerance, passes, product, out):
-    """Step the boom along given drives, and write rows of results.
+    """Step the boom along given drives, and write rows of results `out`, shape (rows, row_width), see `observe`.
 
-    Parameters
-    ----------
-    steps : ndarray, shape (rows,)
-        Length (s) of the steps that lead to each row.
-    counts : ndarray of int, shape (rows,)
-        Number of these steps. `drives`, `rates` and `loads` have a row for each step.
-    drives, rates : ndarray, shape (sum of counts, n)
-        Drive lengths (m) and rates (m/s) at the instant of every step that the scheme solves for.
-    loads : ndarray, shape (sum of counts, 2)
-        Force at the tip (N) at the end of every step; no rows, no force. Before the first step it is ``work.load[1]``.
-    family, parameter : int, float
-        See `kernels.integrators.prepare`.
-    product : Product or None
-        See `advance`.
-    out : ndarray, shape (rows, row_width)
-        See `observe`.
+    To each row lead `counts` (rows,) steps of `steps` (rows,) s. `drives` (m) and `rates` (m/s) have a row (n,) for the
+    instant that each step solves for, `loads` one for the force at the tip (N) at its end; no rows, no force. Before the
+    first step the force is ``work.load[1]``. For `family` and `parameter` see `kernels.integrators.prepare`, for the rest
+    `advance`.
 
-    Returns
-    -------
-    status, row, passes : int
-        Status of the last step and the row it belongs to; total of Newton passes.
-    jolt : float
-        Sum over all steps of h^2 |a' - a| of the tip, m. It measures the step error, see `Simulation`.
-    shake : float
-        Sum over all steps of h^2 |a'| of the tip, m. It is half of `jolt` if the acceleration changes sign in every step.
+    Return status of the last step, the row it belongs to, total of Newton passes, `jolt` and `shake`: sums over all steps of
+    h^2 |a' - a| and of h^2 |a'| of the tip, m. The first measures the step error, see `Simulation`. The second is half of the
+    first if the acceleration changes sign in every step.
     """
     at, total, jolt, shake, a = 0, 0, 0.0, 0.0, state.history[A]
     keep = product is None and passes > 1 and t.clearances.shape[0] == 0

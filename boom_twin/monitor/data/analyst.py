@@ -39,9 +39,7 @@ SIGNALS = (
     PREDICTION,
 )
 """The best first: the prediction knows nothing of what shakes the boom."""
-RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)
-"""Frequencies of the responses, Hz."""
-MILLIMETRE = 1e-3
+RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)  # frequencies of the responses, Hz
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +64,7 @@ class ResponseList(PresentPosture[TipResponses]):
         try:
             boom = linearised_boom(self._scene, strokes)
             drives = range(boom.plan.joints)
-            loads = [boom.load(UPWARD), *(MILLIMETRE * boom.load(drive=i) for i in drives)]
+            loads = [boom.load(UPWARD), *(1e-3 * boom.load(drive=i) for i in drives)]
             columns = [np.linalg.norm(boom.respond(RESPONSE_FREQUENCIES, load).tip_acceleration, axis=1) for load in loads]
         except BoomTwinError as error:
             return TipResponses(trouble=str(error))
@@ -74,21 +72,15 @@ class ResponseList(PresentPosture[TipResponses]):
         return TipResponses(names, RESPONSE_FREQUENCIES, np.column_stack(columns), rates_to_avoid(columns[0]))
 
 
-PUMP_RATES = np.linspace(0.2, 1.2, 201)
-"""Rates of a pump, Hz."""
-HARMONICS = np.arange(1, 16, 2)
-"""Harmonics of pump pulses that are on for half a period; there are no even ones."""
+PUMP_RATES = np.linspace(0.2, 1.2, 201)  # rates of a pump, Hz
+HARMONICS = np.arange(1, 16, 2)  # harmonics of pump pulses that are on for half a period; there are no even ones
 
 
 def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
     """Return the ranges of pump rates (Hz) at which the tip swings `TOO_MUCH` times as far as at the median rate.
 
-    It is the rule of `boom_twin.analysis.resonance_map`, on a response that is known: root mean square for peak to peak.
-
-    Parameters
-    ----------
-    accelerations : ndarray, shape (k,)
-        Amplitude of the tip's acceleration (m/s^2) by 1 N at `RESPONSE_FREQUENCIES`.
+    `accelerations` (k,) of the tip (m/s^2) by 1 N are at `RESPONSE_FREQUENCIES`. The rule is that of
+    `boom_twin.analysis.resonance_map`: root mean square for peak to peak.
     """
     swings = accelerations / (2.0 * np.pi * RESPONSE_FREQUENCIES) ** 2
     at = HARMONICS * PUMP_RATES[:, None]
@@ -100,11 +92,9 @@ def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
 
 
 UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
-UNKNOWN_POSTURE = TipResponses(trouble="the strokes are not known yet")
-KNOWN_SHARE = 0.9
-"""Share of the rows of a signal that must have a value."""
-MODE_DISTANCE = 0.2
-"""Relative distance up to which a peak is taken for a mode of the model."""
+UNKNOWN_POSTURE = TipResponses(trouble="the posture is not known yet")
+KNOWN_SHARE = 0.9  # share of the rows of a signal that must have a value
+MODE_DISTANCE = 0.2  # relative distance up to which a peak is taken for a mode of the model
 
 
 class Analyst:
@@ -182,7 +172,6 @@ class Analyst:
         return PREDICTION
 
     def _moved(self, time: float) -> float:
-        """Return the largest motion (m) of a cylinder within the window before `time` (s)."""
         strokes = self._feed.strokes_between(time - SPECTRUM_SPAN, time)
         return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
 

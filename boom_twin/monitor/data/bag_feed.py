@@ -31,13 +31,10 @@ from ...types import NANO
 from .feed import Feed
 from .store import Store
 
-DIAGNOSIS_PERIOD = 1.0
-"""Seconds between two diagnoses of the twin, as of the node."""
-PUBLISHED_OUTPUT = Output.TIP_ACCELERATION
-"""A session with this output is shown as its node published it."""
+DIAGNOSIS_PERIOD = 1.0  # seconds between two diagnoses of the twin, as of the node
+PUBLISHED_OUTPUT = Output.TIP_ACCELERATION  # A session with this output is shown as its node published it
 COMPILING = "compiling the model (up to a minute the first time)"
-READING_TIME = 0.04
-"""Seconds of reading at a time, after which the pages have their turn."""
+READING_TIME = 0.04  # seconds of reading at a time, after which the pages have their turn
 
 
 class BagFeed(Feed):
@@ -81,17 +78,10 @@ def bag_feed(
     window: TimeWindow = WHOLE,
     namespace: str = "",
 ) -> BagFeed:
-    """Open a recording, or the result bag of a replay.
+    """Open a recording, or the result bag of a replay; for the parameters see `boom_twin.offline.replay.replay`.
 
-    The parameters are those of `boom_twin.offline.replay.replay`. A session without outputs is run through a twin with these
-    `settings`, at rest where the `window` begins.
-
-    Raises
-    ------
-    BagError
-        It cannot be read, is of another boom, or has nothing that can be shown.
-    UsageError
-        The mapping cannot be used.
+    A session without outputs is run through a twin with these `settings`, at rest where the `window` begins. BagError if it
+    cannot be read, is of another boom, or has nothing that can be shown.
     """
     options = ReplayOptions(mapping=mapping, window=window, namespace=namespace)
     given = replay_inputs(path, scene, settings, options)
@@ -112,7 +102,6 @@ def bag_feed(
 
 
 def _names(topics: Topics) -> dict[str, Topic]:
-    """Return every topic that may be shown, by its absolute name."""
     shown = [*topics.inputs.values(), *topics.outputs.values(), topics.events]
     return {topic.absolute: topic for topic in shown}
 
@@ -202,6 +191,5 @@ class TwinView:
 
 
 def _as_message(status: Status) -> Any:
-    """Return a status as a message on ``/diagnostics`` holds it."""
     values = [SimpleNamespace(key=key, value=str(value)) for key, value in status.values.items()]
     return SimpleNamespace(name=f"{NODE}: {status.name}", level=status.level, message=status.message, values=values)

@@ -22,22 +22,10 @@ from .topic_rows import TopicRows
 
 
 class Feed:
-    """Source of the page's data: a store and the reader that fills it.
+    """Source of the page's data: a store and the reader that fills it; its `title` says in words what is shown.
 
-    `boom_twin.monitor.data.bag_feed` and `boom_twin.ros.monitor_feed` have the two kinds.
-
-    Parameters
-    ----------
-    title : str
-        What is shown, in words.
-    store : Store
-    topics : Topics
-    scene : Scene, optional
-        By default the package's own, if the node says that it uses that. No file is opened that a message names.
-    end : float, optional
-        Length of a recorded session, s; None if it is live.
-    boom : str
-        Name of the boom among several: the namespace of its node, empty if it has none.
+    Without a `scene` it is the package's own, if the node says that it uses that; no file is opened that a message names.
+    `end` (s) is the length of a recorded session, None if it is live. `boom` is the namespace of its node.
     """
 
     def __init__(
@@ -113,12 +101,7 @@ def sessions_in(path: Path) -> list[Path]:
 class SessionList:
     """Recorded sessions, of which one is open at a time: its `index` among the `names`, and its `feed`.
 
-    The first of `paths` that can be read is opened at once; `open_feed` returns the feed of a path.
-
-    Raises
-    ------
-    BoomTwinError
-        No session can be read. From `open`: this one cannot.
+    The first of `paths` that can be read is opened at once; BoomTwinError if none can.
     """
 
     def __init__(self, paths: Sequence[Path], open_feed: Callable[[Path], Feed]) -> None:

@@ -14,10 +14,8 @@ from ...system.terminal_text import printable
 from ...types import SENSORS, Stream, stream_of
 
 LOG = logging.getLogger("boom_twin.monitor.data.dropped_messages")
-LONGEST_REASON, LONGEST_TEXT = 200, 500
-"""Characters of a reason, and of another text, that are kept."""
-LARGEST_NUMBER = 1e12
-"""Largest magnitude of a number: none of the twin's, in SI units, comes near it."""
+LONGEST_REASON, LONGEST_TEXT = 200, 500  # characters of a reason, and of another text, that are kept
+LARGEST_NUMBER = 1e12  # largest magnitude of a number: none of the twin's, in SI units, comes near it
 
 
 class MalformedError(Exception):

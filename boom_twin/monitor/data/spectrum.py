@@ -12,19 +12,13 @@ from scipy.signal import find_peaks, hilbert, periodogram
 from ...analysis.even_times import power_density, spacing
 from ...types import Array
 
-SPECTRUM_SPAN = 40.0
-"""Time span of the spectrum, up to the shown time, s."""
-SEGMENT = 8.0
-"""Segment of Welch's method, s (Hann window, half overlapping, mean removed)."""
-LOWEST_PEAK, HIGHEST_PEAK = 0.3, 30.0
-"""Frequencies of peaks, Hz."""
+SPECTRUM_SPAN = 40.0  # time span of the spectrum, up to the shown time, s
+SEGMENT = 8.0  # segment of Welch's method, s (Hann window, half overlapping, mean removed)
+LOWEST_PEAK, HIGHEST_PEAK = 0.3, 30.0  # frequencies of peaks, Hz
 MAX_PEAKS = 5
-PROMINENCE = 6.0
-"""Lowest prominence of a peak, dB."""
-BAND = 0.3
-"""Half width of the band around a peak for its damping, as a share of its frequency."""
-DECAY_FLOOR = 0.3
-"""Lowest evaluated value of a decay, as a share of its first."""
+PROMINENCE = 6.0  # lowest prominence of a peak, dB
+BAND = 0.3  # half width of the band around a peak for its damping, as a share of its frequency
+DECAY_FLOOR = 0.3  # lowest evaluated value of a decay, as a share of its first
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,12 +94,9 @@ def damping(values: Array, rate: float, frequency: float) -> float:
     return ratio if isfinite(ratio) and ratio > 0.0 else nan
 
 
-COLUMN_STEP = 2.0
-"""Session time between columns of the spectrogram, s. Columns end at its multiples."""
-FREQUENCIES = np.arange(0.0, 20.0 + 0.5 / SEGMENT, 1.0 / SEGMENT)
-"""Frequencies of every column, Hz."""
-COVERAGE = 0.9
-"""Smallest share of a segment that its rows span."""
+COLUMN_STEP = 2.0  # session time between columns of the spectrogram, s; columns end at its multiples
+FREQUENCIES = np.arange(0.0, 20.0 + 0.5 / SEGMENT, 1.0 / SEGMENT)  # frequencies of every column, Hz
+COVERAGE = 0.9  # smallest share of a segment that its rows span
 
 
 def spectrogram(times: Array, values: Array, ends: Array) -> NDArray[np.float32]:

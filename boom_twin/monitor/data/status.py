@@ -14,17 +14,12 @@ from ...texts import LANGUAGES, alarm_sentence, alarm_text
 from ...types import Alarm
 from .received_messages import text
 
-SILENCE = 3.0
-"""Seconds without a word from a node after which its lamps are stale."""
-MAX_NODES, FORGET_AFTER = 200, 60.0
-"""Number of nodes above which those that have been silent for so many seconds are deleted."""
+SILENCE = 3.0  # seconds without a word from a node after which its lamps are stale
+MAX_NODES, FORGET_AFTER = 200, 60.0  # number of nodes above which those that have been silent for so many seconds are deleted
 GROUPS = ("sensors", "model", "residuals", "timing", "recorder")
-HEALTH = "health"
-"""The status that stands for all alarms of the rig's health."""
-SENSOR_GROUPS = ("sensor", "residual")
-"""Kinds of statuses that speak of one channel, as an alarm of the rig's health does."""
-WITH_FIGURES = ("swing", "tip load", "model")
-"""Statuses whose values are kept, for the page and for ``/metrics``."""
+HEALTH = "health"  # the status that stands for all alarms of the rig's health
+SENSOR_GROUPS = ("sensor", "residual")  # kinds of statuses that speak of one channel, as an alarm of the rig's health does
+WITH_FIGURES = ("swing", "tip load", "model")  # statuses whose values are kept, for the page and for ``/metrics``
 _LIMITS = ("_error", "_warn", "_stale")
 
 
@@ -151,10 +146,8 @@ def _number(text: str) -> float:
         return nan
 
 
-LONGEST_NAME = 100
-"""Characters beyond which an alarm names no more sensors."""
-MAX_ALARMS = 500
-"""Alarms that are kept."""
+LONGEST_NAME = 100  # characters beyond which an alarm names no more sensors
+MAX_ALARMS = 500  # alarms that are kept
 
 
 @dataclass(slots=True)
@@ -277,12 +270,10 @@ class AlarmList:
 
 
 def _words(channel: str, kind: str, cause: str | None) -> dict[str, str]:
-    """Return the sentence about an alarm by language."""
     return {language: text(alarm_text(channel, kind, cause, language)) for language in LANGUAGES}
 
 
 def _renew(alarm: ListedAlarm, found: Alarm, time: Callable[[int], float]) -> None:
-    """Update `alarm` to the present state of `found`, an alarm of the health monitor."""
     causes = tuple((text(each.cause), each.probability) for each in found.ranked) or ((text(found.cause or "not known"), nan),)
     is_same = [each[0] for each in causes[:1]] == [each[0] for each in alarm.causes[:1]]
     alarm.is_acknowledged &= is_same and found.until is None

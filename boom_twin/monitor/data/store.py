@@ -9,12 +9,11 @@ from operator import itemgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from ...types import NANO
+from ...types import NANO, Stream
 from .received_messages import MalformedError
 from .status import AlarmList, StatusTable
 
-FIRST_ROOM = 1024
-"""Initial capacity of a table, rows."""
+FIRST_ROOM = 1024  # initial capacity of a table, rows
 Rows = tuple[NDArray[np.float64], NDArray[np.float32]]
 
 
@@ -58,12 +57,10 @@ class Table:
         return self._times[places], self._values[places]
 
 
-MAX_STATUSES = 100_000
-"""Largest number of kept states of the lamps, about a day."""
+MAX_STATUSES = 100_000  # largest number of kept states of the lamps, about a day
 SET_BACK = 1_000_000_000
 """Threshold (ns) of a backward jump: beyond it the clock may have been set back, else the stamp is out of order."""
-LEAP_AHEAD = 60_000_000_000
-"""Threshold (ns) of a forward jump that may be an outlier. Rows of a table are closer together."""
+LEAP_AHEAD = 60_000_000_000  # threshold (ns) of a forward jump that may be an outlier; rows of a table are closer together
 EVERY_STROKE, GAP = "displacement", 0.1
 """Table with a row for every stroke sample; pause (s) between its rows that raises an alarm."""
 
@@ -73,6 +70,7 @@ class Store:
 
     def __init__(self, capacity: int, keeps_statuses: bool = False) -> None:
         self._capacity, self._keeps_statuses = capacity, keeps_statuses
+        self.driven_by = Stream.STROKES  # stream whose samples the model follows
         self.generation = 0  # incremented when a clock set back deletes all rows
         self.epoch = self._before = 0  # first stamp (ns), origin of times; the one before all rows were deleted
         self.newest = 0.0  # newest time of all tables, s
@@ -97,15 +95,10 @@ class Store:
         return (stamp - self.epoch) * NANO
 
     def receive(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
-        """Add a row to a table after a check of its stamp.
+        """Add a row to a table; MalformedError if its stamp is not after the last one or the columns differ.
 
-        A row with a jump in its stamp is held until the next row of its table. If that row follows it closely, both are
-        added. Otherwise the held row was an outlier. A clock set back deletes all earlier rows.
-
-        Raises
-        ------
-        MalformedError
-            The stamp is not after the last one, the columns differ, or the held row was an outlier.
+        A row with a jump in its stamp is held until the next row of its table. If that follows closely, both are added.
+        Otherwise the held row was an outlier, which is an error. A clock set back deletes all earlier rows.
         """
         if name in self.tables and self.tables[name].columns != tuple(columns):
             raise MalformedError(_difference(self.tables[name].columns, columns))
@@ -133,7 +126,7 @@ class Store:
             self.tables[name] = Table(name, columns, self._capacity)
         table, time = self.tables[name], self.time(stamp)
         if name == EVERY_STROKE and table.count and time - table.newest > GAP:
-            self.alarms.add_gap("cylinder_strokes", table.newest, time)
+            self.alarms.add_gap(self.driven_by.value, table.newest, time)
         table.append(time, values)
         self.newest = max(self.newest, time)
 

@@ -31,20 +31,15 @@ from .received_messages import (
 from .status import MAX_NODES, Severity
 from .store import Store
 
-MAX_BYTES = 1_000_000
-"""Bytes of an encoded message; a longer one is not decoded."""
+MAX_BYTES = 1_000_000  # bytes of an encoded message; a longer one is not decoded
 MAX_STATUSES, MAX_CAUSES, MAX_MARKERS = 500, 100, 500
 """Statuses or alarms of one message, causes of one alarm, markers of one shape."""
-MAX_COLUMNS = 1000
-"""Numbers of one row; a boom of nine sections has some two hundred."""
-MAX_WAITING = 1000
-"""Stamps of which parts may wait for the others."""
-COMPARED = Stream.IMU
-"""The stream whose readings are shown beside the predicted ones; of all others the residuals are."""
+MAX_COLUMNS = 1000  # numbers of one row; a boom of nine sections has some two hundred
+MAX_WAITING = 1000  # stamps of which parts may wait for the others
+COMPARED = Stream.IMU  # the stream whose readings are shown beside the predicted ones; of all others the residuals are
 RESIDUALS = {stream: "joints" if stream is Stream.ANGLES else stream.value for stream in Stream if stream is not COMPARED}
 """Names of the tables of residuals."""
-NO_MEASUREMENT = "no measurement"
-"""Oddity of `SampleDecoder` that is no fault here: an Imu states that it has no measurement."""
+NO_MEASUREMENT = "no measurement"  # oddity of `SampleDecoder` that is no fault here: an Imu states that it has no measurement
 PLANE, ACCELERATION = ("x_m", "z_m"), ("x_m_s2", "z_m_s2")
 ESTIMATE = "estimate"
 ESTIMATE_COLUMNS = (
@@ -117,6 +112,7 @@ class TopicRows:
 
     def __init__(self, store: Store, topics: Topics) -> None:
         self._store, self._decoder = store, SampleDecoder(1, topics)
+        store.driven_by = topics.stroke_reading.stream
         self.dropped = DroppedMessages()
         self._forces_felt, self._estimates = PartsOfRows((COMPARED, Output.RESIDUALS)), PartsOfRows(JOINED)
         self._forces: list[float] = []
@@ -182,7 +178,6 @@ class TopicRows:
             self._join_estimate(role, stamp, values)
 
     def _join_estimate(self, role: Output, stamp: int, values: list[float]) -> None:
-        """Add the row of an estimate as soon as all its parts are there."""
         if (parts := self._estimates.put(role, stamp, values)) is None:
             return
         displacement, position, pose, acceleration, load = parts
@@ -211,7 +206,6 @@ class TopicRows:
             self._append(RESIDUALS[stream], [f"{name}_{end}" for end in ends for name in msg.name], stamp, values + ratios)
 
     def _join_force(self, part: Hashable, stamp: int, values: list[float]) -> None:
-        """Add the row of a measurement and its residual as soon as both are there."""
         if (parts := self._forces_felt.put(part, stamp, values)) is not None:
             (x, z), (left_x, left_z, *sigmas) = parts
             self._append("force", FORCE_COLUMNS, stamp, [x, z, x - left_x, z - left_z, *sigmas])

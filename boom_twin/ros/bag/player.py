@@ -22,12 +22,9 @@ from .subscriptions import installed_class
 
 CLOCK = "/clock"
 NAME = "boom_twin_player"
-LOOK = 0.05
-"""Polling period (s) of listeners and pause."""
-DELIVERY = 10.0
-"""Timeout (s) for acknowledgements of reliable listeners at the end."""
-SETTLE = 0.5
-"""Time (s) from the match with the last listener to the first message."""
+LOOK = 0.05  # polling period (s) of listeners and pause
+DELIVERY = 10.0  # timeout (s) for acknowledgements of reliable listeners at the end
+SETTLE = 0.5  # time (s) from the match with the last listener to the first message
 CATCH_UP = 4.0
 """Factor on the rate at which overdue messages are sent after a delay.
 
@@ -40,7 +37,6 @@ class Player:
 
     Parameters
     ----------
-    session : Session
     names : sequence of str, optional
         Topics, with the session's quality of service; by default the inputs of the twin.
     clock_rate : float, optional
@@ -48,8 +44,6 @@ class Player:
 
     Attributes
     ----------
-    sent : Counter of str
-        Messages sent by topic, in all calls of `play` so far.
     wall, latest : float
         Wall time (s); largest delay of a message (s).
 
@@ -73,7 +67,7 @@ class Player:
         self._clock: Publisher[Any] | None = None
         if clock_rate is not None:
             self._clock = self._node.create_publisher(Clock, CLOCK, 10)
-        self.sent: Counter[str] = Counter()
+        self.sent: Counter[str] = Counter()  # messages sent by topic, in all calls of `play` so far
         self.latest = self.wall = self._ask = 0.0
 
     @property

@@ -31,10 +31,8 @@ NAMES = ("scene", "mapping", "frame_prefix", *Settings.model_fields)
 
 
 NAME = "boom_twin_recorder"
-LOOK = 0.5
-"""Seconds between looks for new topics, publishers and the disk."""
-LOOKS = 2
-"""Looks from one state on ``/diagnostics`` to the next."""
+LOOK = 0.5  # seconds between looks for new topics, publishers and the disk
+LOOKS = 2  # looks from one state on ``/diagnostics`` to the next
 COMPLETE = "every required topic has a publisher"
 
 
@@ -143,13 +141,6 @@ class Recorder:
 
     Parameters
     ----------
-    node : Node
-        See `recorder_node`.
-    storage : Storage
-        Completed at the end.
-    wanted : sequence of RequestedTopic
-    thresholds : Thresholds
-        Of the state on ``/diagnostics``.
     tell : callable
         Told in words when recording begins, once every required topic has a publisher (`COMPLETE`), and what is left out.
     """

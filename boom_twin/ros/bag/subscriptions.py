@@ -98,27 +98,16 @@ def _short(name: str) -> str:
     return name.replace("/msg/", "/")
 
 
-DEPTH = 4000
-"""Queue of every topic, messages: some seconds of a session."""
+DEPTH = 4000  # queue of every topic, messages: some seconds of a session
 
 
 @dataclass(frozen=True, slots=True)
 class RequestedTopic:
-    """Topic to record.
+    """Topic to record."""
 
-    Attributes
-    ----------
-    name : str
-        Absolute name.
-    type : str or None
-        None for the type of its first publisher.
-    topic : Topic or None
-        Entry of ``topics.yaml``, if any.
-    """
-
-    name: str
-    type: str | None = None
-    topic: Topic | None = None
+    name: str  # absolute name
+    type: str | None = None  # None for the type of its first publisher
+    topic: Topic | None = None  # entry of ``topics.yaml``, if any
 
     @property
     def required(self) -> bool:
@@ -128,12 +117,6 @@ class RequestedTopic:
 
 def requested_topics(names: Sequence[str], known: Mapping[str, Topic]) -> list[RequestedTopic]:
     """Return the topics named on a command line: ``NAME`` or ``NAME:package/msg/Name``.
-
-    Parameters
-    ----------
-    names : sequence of str
-    known : dict of str to Topic
-        Topics by absolute name.
 
     Raises
     ------

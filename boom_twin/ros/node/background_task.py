@@ -23,9 +23,6 @@ class BackgroundTask(Generic[Result]):
 
     Parameters
     ----------
-    node : Node
-    work : callable
-        Function to call in the thread.
     use : callable
         Receiver of the result of `work`, in the executor's thread.
     give_up : callable

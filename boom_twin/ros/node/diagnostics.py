@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import cycle
 from typing import Any
@@ -26,6 +26,7 @@ from ...twin.events import EVENTS, TOLD_AT_ONCE
 from ...twin.load_shedding import LoadShedding
 from ...twin.twin import Twin
 from ...types import NANO, Stream
+from ...types import Clock as StreamClock
 from ..diagnostics_publisher import DiagnosticsPublisher
 from ..runtime import Log, node_name, qos_profile
 from .receive_queue import LARGEST, ReceiveQueue
@@ -35,19 +36,12 @@ class GraphPeers:
     """Peers (publishers or subscribers) of every topic of `node`, looked up one topic per call.
 
     Discovery is used because the events of incompatible QoS do not name the peer and do not report when it leaves.
-
-    Attributes
-    ----------
-    publishers : dict of Stream to Peers
-        Peers of the inputs.
-    subscribers : dict of Output to Peers
-        Peers of the outputs.
     """
 
     def __init__(self, node: Node, topics: Topics) -> None:
         self._node = node
-        self.publishers = dict.fromkeys(topics.inputs, Peers())
-        self.subscribers = dict.fromkeys(topics.outputs, Peers())
+        self.publishers = dict.fromkeys(topics.inputs, Peers())  # peers of the inputs
+        self.subscribers = dict.fromkeys(topics.outputs, Peers())  # peers of the outputs
         entries: list[tuple[Stream | Output, Topic]] = [*topics.inputs.items(), *topics.outputs.items()]
         self._entries = cycle([(key, topic, _as_discovered(qos_profile(topic.qos))) for key, topic in entries])
 
@@ -118,20 +112,7 @@ SLOWEST = 0.02  # s between pieces on average, at most; in a flood of messages t
 
 
 class Diagnostics:
-    """Diagnostics of one node, computed and logged periodically and never per message.
-
-    Parameters
-    ----------
-    node : Node
-    topics : Topics
-    queue : ReceiveQueue
-        Queue of the inputs.
-
-    Attributes
-    ----------
-    watch : TwinWatch
-        Receives the twin's events. Every `configure` replaces it.
-    """
+    """Diagnostics of one node, computed and logged periodically and never per message."""
 
     def __init__(self, node: Node, topics: Topics, queue: ReceiveQueue) -> None:
         self._node, self._logger, self._queue = node, Log(node), queue
@@ -147,9 +128,10 @@ class Diagnostics:
         self._newest_piece, self._is_peers_turn = 0.0, False
         self._due, self._active = time.monotonic() + PERIOD, False
         self._preparing_since: float | None = None
-        self.watch = TwinWatch({}, {}, Thresholds())
+        self.watch = TwinWatch({}, {}, Thresholds())  # receives the twin's events. Every `configure` replaces it
         self._counts: dict[str, Mapping[str, int]] = {}
         self._shedding: LoadShedding | None = None
+        self._lags: Callable[[], Mapping[Stream, StreamClock]] = dict
         self._decoder: SampleDecoder | None = None
         self._scene, self._joints = "", 0
         self._told: set[str] = set()
@@ -162,6 +144,7 @@ class Diagnostics:
     def configure(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """Watch a newly configured twin."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts, twin.absent)
+        self._lags = lambda: twin.clocks
         stress = stress_model(twin.scene, twin.reads)
         self.watch = TwinWatch(sensors, self._inputs, self.watch.thresholds, stress=stress)
         self._queue.oddities.clear()
@@ -208,6 +191,9 @@ class Diagnostics:
         clock = self._node.get_clock().now().nanoseconds * NANO
         told: dict[str, Value] = {"scene": self._scene}
         told |= {f"{kind}: {name}": count for kind, found in self._counts.items() for name, count in sorted(found.items())}
+        for stream, each in self._lags().items():
+            told |= {f"{stream.value} lag_s": each.lag, f"{stream.value} lag_sigma_s": each.lag_sigma}
+            told[f"{stream.value} clock_drift_ppm"] = 1e6 * each.drift
         peers = self._peers
         wrong, received = self._wrong_names(), self._queue.look()
         ends = peers.publishers, peers.subscribers.values()

@@ -10,12 +10,10 @@ from rclpy.node import Node
 from ...messages.topic_table import NODE, Topics
 from ...system.child_process import end_process, python_command
 
-LOOK = 1.0
-"""Seconds of steady time between looks at whether it still runs."""
+LOOK = 1.0  # seconds of steady time between looks at whether it still runs
 SERVICES = ("acknowledge", "get_parameters", "scene")
 """Services of the node that are used by the page, or by the recorder that it starts."""
-END_TIMEOUT = 1.0
-"""Seconds that it may take to end."""
+END_TIMEOUT = 1.0  # seconds that it may take to end
 
 
 class MonitorProcess:
@@ -28,7 +26,6 @@ class MonitorProcess:
     ----------
     node : Node
         Its names, namespace and remappings are those that the page listens to.
-    topics : Topics
     mapping, scene : str
         Their paths; empty: the package's own.
     """

@@ -183,7 +183,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         def make() -> Twin:
             reads, absent = topics.stroke_reading, topics.absent
             given = scene, topics.noise_of(settings), mounts, health, reads, absent
-            twin = Twin(*given, causes=causes, is_live=True, places=topics.places)
+            twin = Twin(*given, causes=causes, is_live=True, places=topics.places, lagging=topics.lagging)
             twin.warm_up()
             import_module("scipy.special")  # the first alarm and the first pause need it; their samples would wait 0.3 s
             return twin

@@ -18,16 +18,12 @@ from ...diagnostics.topic_status import Reception
 from ...types import NANO
 from ..runtime import CallbackTurns, with_information
 
-FRESH = 0.005
-"""Age (s) of a message from the executor above which more are assumed to wait in the executor's queue."""
+FRESH = 0.005  # age (s) of a message from the executor above which more are assumed to wait in the executor's queue
 LARGEST = 1 << 18
 """Largest message that is read, bytes. A message of a thousand names (the most that are examined) is smaller."""
-CATCH_UP = 0.5
-"""Time limit (s) for reading messages before a request whose answer depends on them."""
-BUDGET = 0.01
-"""Time limit (s) for reading messages between two turns of the executor."""
-INTAKE = 0.2
-"""Time limit (s) for taking messages from the executor before some are read."""
+CATCH_UP = 0.5  # time limit (s) for reading messages before a request whose answer depends on them
+BUDGET = 0.01  # time limit (s) for reading messages between two turns of the executor
+INTAKE = 0.2  # time limit (s) for taking messages from the executor before some are read
 
 
 class _Topic:
@@ -66,11 +62,6 @@ class ReceiveQueue:
 
     If a topic exceeds its `depth`, its oldest message is dropped. Other topics lose none.
 
-    Parameters
-    ----------
-    clock : callable
-        System time, ns: the middleware's clock of arrivals.
-
     Attributes
     ----------
     received : int
@@ -83,8 +74,7 @@ class ReceiveQueue:
         True if the newest message had waited in the executor, so that more may wait there.
     """
 
-    def __init__(self, clock: Callable[[], int] = time.time_ns) -> None:
-        self._clock = clock
+    def __init__(self) -> None:
         self._topics: dict[str, _Topic] = {}
         self._turns: deque[_Topic] = deque()  # topic of each message, by arrival; also of dropped ones
         self.received, self.is_behind, self.share = 0, False, 0.0
@@ -96,23 +86,13 @@ class ReceiveQueue:
         return bool(self._turns) and any(topic.waiting for topic in self._topics.values())
 
     def open(self, name: str, depth: int, read: Callable[[bytes], None]) -> Callable[..., None]:
-        """Return the callback of a raw subscription.
-
-        Parameters
-        ----------
-        name : str
-            Name of the topic.
-        depth : int
-            Largest number of waiting messages.
-        read : callable
-            Reader of a message; it must not raise.
-        """
+        """Return the callback of a raw subscription."""
         self._topics[name] = topic = _Topic(depth, read)
 
         def put(data: bytes, info: Mapping[str, Any]) -> None:
             if self._topics.get(name) is not topic:  # closed while this message waited in the executor
                 return
-            now = self._clock()
+            now = time.time_ns()  # the middleware's clock of arrivals
             arrival = info["received_timestamp"] or now
             topic.count(info["publication_sequence_number"])
             if len(data) > LARGEST:
@@ -183,7 +163,7 @@ class ReceiveQueue:
             turns.end()
 
     def _since(self, arrival: int) -> float:
-        return max(0, self._clock() - arrival) * NANO
+        return max(0, time.time_ns() - arrival) * NANO
 
     def catch_up(self) -> None:
         """Read messages that arrived before the present request, for at most `CATCH_UP`."""

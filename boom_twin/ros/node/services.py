@@ -18,8 +18,7 @@ from ...twin.twin import Twin
 from ...types import SENSORS, Change, Report, Stream, StrokeReading, streams_of
 from ..runtime import Log
 
-PAUSE = 1.0
-"""Time (s) between two calls of a service that starts the model from rest, which takes as long as hundreds of steps."""
+PAUSE = 1.0  # time (s) between two calls of a service that starts the model from rest, which takes as long as hundreds of steps
 FROM_REST = re.compile(r"reset|rezero/cylinder_\d+")
 INACTIVE = "the node is not active, so nothing is measured. Activate it first."
 
@@ -33,13 +32,10 @@ class Services:
 
     Parameters
     ----------
-    node : Node
     twin : Twin
         Takes what is asked for with its next full stroke sample.
     acknowledge : callable
         Lets go of alarms that ended; says which.
-    is_active : callable
-        Whether the node is.
     catch_up : callable
         Lets the twin take what arrived before a request.
     scene : str
@@ -115,12 +111,7 @@ LOG_PERIOD = 1.0
 
 
 class StartLog:
-    """Log of the changes from which on the model runs with other settings or zeros, or restarts from static equilibrium.
-
-    Parameters
-    ----------
-    log : Log
-    """
+    """Log of the changes from which on the model runs with other settings or zeros, or restarts from static equilibrium."""
 
     def __init__(self, log: Log) -> None:
         self._log = log

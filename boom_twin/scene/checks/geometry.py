@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...config.yaml_text import Place
-from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
-from ..kinematics import linkage_of, transmission_angles
+from ..kinematics import joint_curve, linkage_of
 from ..schema import Joint, Point, Section
 from . import Draft, Findings
 from .values import NEEDED
@@ -119,8 +118,7 @@ def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Findings:
     """Check the cylinder's length over range_deg: faults if the joint is of no use at all, else one warning."""
     place: Place = ("joints", i, "range_deg")
     degrees = grid_of(joint)
-    with np.errstate(invalid="ignore"):
-        lengths = cylinder_length(row, np.radians(degrees))[0]
+    lengths = joint_curve(row, np.radians(degrees)).lengths
     if not np.isfinite(lengths).any():
         bound = f"{UNMET} any angle of it"
         remedy = f"Check D, E, lL and lR, their signs and their units: {_sizes_to_meet(row, degrees)}."
@@ -155,7 +153,7 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
     shortest, longest = float(np.nanmin(lengths)), float(np.nanmax(lengths))
     within = np.where(reached, lengths, np.nan)
     turns = _turns(within)
-    tight, tight_words = _dead_centres(joint, row, degrees, reached)
+    tight, tight_words = _dead_centres(row, degrees, reached)
     reasons, remedies = [], []
     if not closed.all():
         reasons.append(f"{UNMET} {intervals(degrees, ~closed)}")
@@ -177,12 +175,9 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
         yield draft.warning(("joints", i, "range_deg"), joint.range_deg, "; ".join(reasons), f"{remedy}.")
 
 
-def _dead_centres(joint: Joint, row: np.record, degrees: Array, reached: Mask) -> tuple[Mask, list[str]]:
+def _dead_centres(row: np.record, degrees: Array, reached: Mask) -> tuple[Mask, list[str]]:
     """Return a mask of the angles next to a dead centre, and the sentences that say so."""
-    angles = np.radians(degrees)
-    with np.errstate(invalid="ignore"):
-        levers = np.abs(cylinder_length(row, angles)[1])
-    between = np.full(len(degrees), 90.0) if joint.kind == "A" else np.degrees(transmission_angles(row, angles))
+    _, levers, between = joint_curve(row, np.radians(degrees))
     counted = levers[reached & (between >= OPEN_DEG)]
     largest = float(counted.max()) if counted.size else float(np.nanmax(np.where(reached, levers, np.nan), initial=0.0))
     flat, weak, told = reached & (between < TRANSMISSION_DEG), reached & (levers < LEVER * largest), []
@@ -217,8 +212,7 @@ def _turned_over(joint: Joint, row: np.record, degrees: Array) -> str:
         other = row.copy()
         for key in signs:
             other[key] = -other[key]
-        with np.errstate(invalid="ignore"):
-            lengths = cylinder_length(other, np.radians(degrees))[0]
+        lengths = joint_curve(other, np.radians(degrees)).lengths
         if np.isfinite(lengths).all() and not _turns(lengths).size:
             return f"give `side: {side}`{words}, if it folds that way"
     return ""
@@ -298,8 +292,7 @@ def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, r
         yield draft.fault(place, value, bound, remedy)
     elif row is not None:
         most = joint.cylinder.max_stroke
-        with np.errstate(invalid="ignore"):
-            stroke = float(cylinder_length(row, math.radians(degrees))[0]) - joint.cylinder.closed_length
+        stroke = float(joint_curve(row, np.radians(degrees)).lengths) - joint.cylinder.closed_length
         if math.isnan(stroke):
             yield draft.fault(place, value, f"{says}, where its links do not meet", "Change the posture or the links.")
         elif not -ROUNDING <= stroke <= most + ROUNDING:

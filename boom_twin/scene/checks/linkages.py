@@ -18,10 +18,9 @@ import numpy as np
 
 from ...config.yaml_text import Place
 from ...errors import Fault
-from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
-from ..kinematics import RANGE_SAMPLES, joint_pins, linkage, rod_pin_of, transmission_angles
-from ..schema import Cylinder, Oil, Scene, section_depth
+from ..kinematics import RANGE_SAMPLES, joint_curve, joint_pins, linkage, rod_pin_of
+from ..schema import Cylinder, Oil, Scene
 from . import Draft, Findings
 from .geometry import Mask, grid_of, usable
 
@@ -60,17 +59,15 @@ def linkage_account(scene: Scene, i: int) -> LinkageAccount:
     """Return what joint `i` (0-based) of a scene does over its range."""
     row, degrees = linkage(scene, i), np.linspace(*scene.joints[i].range_deg, RANGE_SAMPLES)
     pins = joint_pins(scene, i, np.radians(degrees))
-    with np.errstate(invalid="ignore"):
-        levers = np.abs(cylinder_length(row, np.radians(degrees))[1])
-    between = float(np.degrees(np.nanmin(transmission_angles(row, np.radians(degrees))))) if i else None
-    lever = float(np.nanmin(levers)), float(np.nanmax(levers))
-    return LinkageAccount(lever, between, nearest_pins(pins, degrees), _over_pivot(scene, i, pins, degrees))
+    _, levers, between = joint_curve(row, np.radians(degrees))
+    lever, least = (float(np.nanmin(levers)), float(np.nanmax(levers))), float(np.nanmin(between)) if i else None
+    return LinkageAccount(lever, least, nearest_pins(pins, degrees), _over_pivot(scene, i, pins, degrees))
 
 
 def pin_diameter(scene: Scene, i: int) -> float:
     """Return the assumed diameter (m) of the pins of joint `i` (0-based): half the bore, which is guessed without `oil`."""
     oil = scene.joints[i].cylinder.oil
-    return PIN * (BORE * section_depth(scene, i) if oil is None else oil.bore)
+    return PIN * (BORE * scene.sections[i].depth if oil is None else oil.bore)
 
 
 def nearest_pins(pins: dict[str, Array], degrees: Array) -> Nearest | None:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from ...config.yaml_text import Place
-from ..schema import Cylinder, Joint, Point, RigidPart, Scene, Section, section_depth
+from ..schema import DEPTH_BY_GYRATION, Cylinder, Joint, Point, RigidPart, Scene, Section
 from . import Draft, Findings
 
 LENGTHS = ("length", "beam", "height", "rod_pin", "com", "pivot", "cylinder_pin", "C", "D", "E", "R", "lL", "lR",
@@ -137,7 +137,7 @@ ROTARY_BY_STEEL = (0.3, 30.0)
 TAPER = (1 / 40, 1.5)  # of EI against the section before
 LEAST_BEAM = 0.6  # of the length
 LONGEST_HEAD = 0.125  # of the length
-DEEP, WALL = 2.4, 20.7  # a thin box is DEEP radii of gyration high, and its wall is A^2/(I WALL) of that
+WALL = 20.7  # the wall of a thin box is A^2/(I WALL) of its depth, DEPTH_BY_GYRATION radii of gyration
 STEEL, STEEL_E = 7850.0, (1.9e11, 2.2e11)
 STEEL_RHO, OF_STEEL = (7700.0, 8000.0), (1.7e11, 2.3e11)  # densities that only steel has, and its E with a wide margin
 SPECIFIC_STIFFNESS = (8e6, 1.2e8)  # E / rho, m^2/s^2: glass fibre 1e7, metals 2.6e7, carbon fibre 9e7
@@ -206,7 +206,7 @@ def _box(draft: Draft, i: int, section: Section, area: float, inertia: float) ->
         yield from draft.expect(place, inertia, GYRATION_BY_HEIGHT, section.height, where, remedy, **judged)
     where, remedy = f" for a section of {section.length:g} m", "Check I (m^4), A (m^2) and length (m), decimals and units."
     yield from draft.expect(place, inertia, GYRATION_BY_LENGTH, section.length, where, remedy, **judged)
-    wall, depth = 1e3 * DEEP * radius / WALL, DEEP * radius
+    wall, depth = 1e3 * DEPTH_BY_GYRATION * radius / WALL, DEPTH_BY_GYRATION * radius
     says = f"with A = {area:g} m^2 this is a box about {depth:.2g} m high with walls of {wall * area**2 / inertia:.2g} mm; "
     judged = {"measured": wall * area**2 / inertia, "says": says}
     yield from draft.expect(place, inertia, COMPACTNESS, wall, " mm", "Check the decimals of I (m^4) and A (m^2).", **judged)
@@ -246,7 +246,7 @@ def rigid_parts(draft: Draft, scene: Scene) -> Findings:
 
 def _part(draft: Draft, scene: Scene, place: tuple[str, int, str], part: RigidPart, span: tuple[float, float]) -> Findings:
     """Check centre, inertia and mass: at least that of a share of as much beam, at most that of a solid block of its depth."""
-    section, depth, length = scene.sections[place[1]], section_depth(scene, place[1]), span[1] - span[0]
+    section, depth, length = scene.sections[place[1]], scene.sections[place[1]].depth, span[1] - span[0]
     more = OVERHANG * section.length
     low, high = span[0] - more, span[1] + more
     if not low <= part.com[0] <= high or abs(part.com[1]) > BESIDE * depth:

@@ -23,7 +23,7 @@ from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
 from ..kinematics import linkage
 from ..oil_spring import middle_stiffness
-from ..schema import Scene, section_depth
+from ..schema import Scene
 from ..worst_load import worst_loads
 from . import Draft, Findings
 
@@ -150,7 +150,7 @@ def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
 def _stiff(draft: Draft, scene: Scene, _found: StraightBoom) -> Findings:
     """Check a constant k against the cylinder that could have it: amid its stroke s, k = 4 B A / s."""
     for i, joint in enumerate(scene.joints):
-        k, depth = joint.cylinder.k or 0.0, section_depth(scene, max(0, i - 1))
+        k, depth = joint.cylinder.k or 0.0, scene.sections[max(0, i - 1)].depth
         bore = math.sqrt(k * joint.cylinder.max_stroke / (math.pi * OIL))
         says = f"amid its stroke a cylinder has it with a bore of {bore:.2g} m; "
         where, remedy = f" m beside a section {depth:.2g} m high", "Check k (N/m), and its decimals."

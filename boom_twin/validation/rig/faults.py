@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import UsageError
-from ...scene.edit import parameter, section_mass
+from ...scene.edit import parameter
 from ...scene.schema import Scene
 from ...types import SECOND, Array
 from .exudyn.solve import Drive
@@ -76,20 +76,14 @@ def _words(form: str, number: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class RigFault:
-    """One fault: its cause, kind and size as in `listing`; its onset and end (s after the start), and its ramp (s).
-
-    Raises
-    ------
-    UsageError
-        There is no such cause, it has no such kind, or size or times are out of bounds.
-    """
+    """One fault. UsageError if there is no such cause or kind, or size or times are out of bounds; see `listing`."""
 
     cause: str
     kind: str
     size: float = 0.0
-    onset: float = 0.0
-    ramp: float = 0.0
-    end: float = math.inf
+    onset: float = 0.0  # s after the start
+    ramp: float = 0.0  # s, from nothing to the full size
+    end: float = math.inf  # s after the start
 
     def __post_init__(self) -> None:
         kinds = next((kinds for form, kinds in _CAUSES.items() if re.fullmatch(form, self.cause)), None)
@@ -160,13 +154,7 @@ FORM = "CAUSE:KIND[:SIZE][@ONSET[+RAMP][..END]]"
 
 
 def parse(text: str) -> RigFault:
-    """Parse a fault that is written as `FORM` says.
-
-    Raises
-    ------
-    UsageError
-        The text has not that form, or see `RigFault`.
-    """
+    """Parse a fault that is written as `FORM` says; UsageError for another form, or see `RigFault`."""
     words, _, when = text.partition("@")
     cause, _, rest = words.partition(":")
     kind, _, size = rest.partition(":")
@@ -197,8 +185,7 @@ def check(faults: Sequence[RigFault], scene: Scene, duration: float) -> None:
             )
 
 
-_MOST = {"late": 10.0, "noisy": 1000.0, "scale": 1.0}
-"""Largest sizes that are the same for all booms; a delay in s."""
+_MOST = {"late": 10.0, "noisy": 1000.0, "scale": 1.0}  # largest sizes that are the same for all booms; a delay in s
 MOST_ANGLE, MOST_FORCE = 1.0, 1e6  # rad, N; bias, spikes, and drift in a second
 
 
@@ -210,7 +197,7 @@ def largest_size(fault: RigFault, scene: Scene, duration: float) -> float:
     if fault.is_of_drive:
         return scene.joints[fault.number - 1].cylinder.max_stroke / (min(fault.end, duration) - fault.onset)
     if fault.kind == "more":
-        mass = sum(map(section_mass, scene.sections))
+        mass = sum(section.mass for section in scene.sections)
         return mass if fault.cause == "tip.payload" else mass / scene.reach
     if fault.kind == "less":
         return parameter(scene, fault.cause)
@@ -251,10 +238,7 @@ SPIKE_SHARE = 0.02  # of the readings
 def spoil(session: RigSession, faults: Sequence[RigFault], seed: int) -> RigSession:
     """Return the session with the sensor faults among `faults`. Readings without a fault and the truth stay, bit for bit.
 
-    Parameters
-    ----------
-    seed : int
-        Of spikes and dropouts; each fault draws from a stream of its own.
+    Spikes and dropouts are drawn by `seed`; each fault draws from a stream of its own.
     """
     sensed = [fault for fault in faults if not fault.is_physical and not fault.is_of_drive]
     for fault, rng in zip(sensed, np.random.default_rng([seed, 1]).spawn(len(sensed)), strict=True):

@@ -18,13 +18,7 @@ JOURNAL = 0.025  # m, radius of a pin that the scene does not list
 
 
 def changes(scene: Scene, faults: Sequence[RigFault]) -> tuple[Scene, list[Change]]:
-    """Return `scene` with the physical `faults` that are there at first, and its changes by those that come or go.
-
-    Raises
-    ------
-    UsageError
-        See `with_faults`.
-    """
+    """Return `scene` with the physical `faults` that are there at first, and its changes by those that come or go."""
     first = [fault for fault in faults if fault.is_there_at_first]
     start, found = with_faults(scene, first), list[Change]()
     for fault in faults:
@@ -42,14 +36,9 @@ def _gone(fault: RigFault, times: Array) -> Array:
 
 
 def with_faults(scene: Scene, faults: Sequence[RigFault]) -> Scene:
-    """Return `scene` with the physical ones of `faults` in full; those of sensors are passed over.
+    """Return `scene` with the physical ones of `faults` in full; UsageError if it lacks the parameter of one.
 
     A pin that the scene does not list gets a journal of 25 mm radius.
-
-    Raises
-    ------
-    UsageError
-        The scene has no such parameter, for instance no oil spring.
     """
     for fault in faults:
         if fault.kind == "play":
@@ -62,7 +51,6 @@ def with_faults(scene: Scene, faults: Sequence[RigFault]) -> Scene:
 
 
 def _worn(scene: Scene, at: str, more: float) -> Scene:
-    """Return `scene` with `more` radial clearance (m) of the pin `at`."""
     clearance = scene.clearance or Clearance()
     pins = {pin.at: pin for pin in clearance.pins}
     pin = pins.get(at) or Pin(at=at, pin_radius=JOURNAL, radial_clearance=0.0)
@@ -79,11 +67,6 @@ def wrong_by(scene: Scene, share: float, seed: int) -> Scene:
 
     z is standard normal, drawn again beyond 2; masses take their inertia with them. Payload, line fill, geometry and material
     damping stay, for they are known, or nothing is predicted from them that a sensor could tell.
-
-    Raises
-    ------
-    UsageError
-        `share` is not from 0 to 0.3.
     """
     if not 0.0 <= share <= MOST_WRONG:
         raise UsageError(f"wrong by {share:g}: must be from 0 to {MOST_WRONG:g}, as a share of every parameter. 0.02 is 2 %.")

@@ -38,29 +38,12 @@ def _bounded(load: str, name: str, value: float, low: float, high: float, unit: 
 
 @dataclass(frozen=True, slots=True)
 class PumpLoad:
-    """Rectangular pulses, on for half of each period; eased flanks.
+    """Rectangular pulses, on for half of each period, with eased flanks; UsageError for a number out of bounds."""
 
-    Parameters
-    ----------
-    frequency : float
-        Hz, of pulses.
-    height : float
-        N.
-    change_over : float
-        s, from 0 to the full height, and back.
-    onset : float
-        s, of the first pulse.
-
-    Raises
-    ------
-    UsageError
-        A number is out of bounds.
-    """
-
-    frequency: float
-    height: float
-    change_over: float = CHANGE_OVER
-    onset: float = 0.0
+    frequency: float  # Hz, of pulses
+    height: float  # N
+    change_over: float = CHANGE_OVER  # s, from 0 to the full height, and back
+    onset: float = 0.0  # s, of the first pulse
 
     def __post_init__(self) -> None:
         _bounded(str(self), "frequency", self.frequency, 0.05, 2.0, "Hz")
@@ -81,26 +64,11 @@ class PumpLoad:
 
 @dataclass(frozen=True, slots=True)
 class WindLoad:
-    """Gusts about the mean wind: normally distributed, of von Karman's spectrum, eased in over 1 s.
+    """Gusts about the mean wind, normally distributed, of von Karman's spectrum, eased in over 1 s; see `PumpLoad`."""
 
-    Parameters
-    ----------
-    deviation : float
-        N, standard deviation.
-    time_scale : float
-        s, length scale of the turbulence over the mean speed: 75 m at 15 m/s.
-    onset : float
-        s.
-
-    Raises
-    ------
-    UsageError
-        A number is out of bounds.
-    """
-
-    deviation: float
-    time_scale: float = 5.0
-    onset: float = 0.0
+    deviation: float  # N, standard deviation
+    time_scale: float = 5.0  # s, length scale of the turbulence over the mean speed: 75 m at 15 m/s
+    onset: float = 0.0  # s
 
     def __post_init__(self) -> None:
         _bounded(str(self), "deviation", self.deviation, 0.1, 500.0, "N")
@@ -141,13 +109,7 @@ def _onset(onset: float) -> str:
 
 
 def parse(text: str) -> RigLoad:
-    """Parse a load that is written as `FORM` says.
-
-    Raises
-    ------
-    UsageError
-        The text has not that form, or a number is out of bounds.
-    """
+    """Parse a load that is written as `FORM` says; UsageError for another form or a number out of bounds."""
     words, _, onset = text.partition("@")
     kind, *sizes = words.split(":")
     if kind not in KINDS:

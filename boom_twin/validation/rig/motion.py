@@ -41,18 +41,13 @@ class Move:
 
 @dataclass(frozen=True)
 class Programme:
-    """Moves of all cylinders; between them they hold. Strokes are twice continuously differentiable.
+    """Moves of all cylinders, which do not overlap for one; between them they hold.
 
-    Parameters
-    ----------
-    first : tuple of float
-        Strokes (m) at the start, one per cylinder.
-    moves : tuple of Move
-        In any order; two moves of one cylinder must not overlap.
+    Strokes are twice continuously differentiable.
     """
 
-    first: tuple[float, ...]
-    moves: tuple[Move, ...]
+    first: tuple[float, ...]  # strokes (m) at the start
+    moves: tuple[Move, ...]  # in any order
 
     def __post_init__(self) -> None:
         for cylinder in range(len(self.first)):
@@ -81,8 +76,7 @@ class Programme:
         return sorted((move for move in self.moves if move.cylinder == cylinder), key=lambda move: move.start)
 
 
-BUNDLED_DURATION = 60.0
-"""Seconds of the bundled session."""
+BUNDLED_DURATION = 60.0  # seconds of the bundled session
 
 BUNDLED_MOVES = (
     Move(0, 3.0, 1.5, 0.665),
@@ -114,12 +108,7 @@ def bundled(scene: Scene) -> Programme:
     """Return the programme of the bundled session, 60 s that end in a hold: from posture arch, or else the scene's first.
 
     A boom with other joints than the default scene's makes moves of the same shares of its cylinders' ranges, as far as they
-    have room; they are smaller where the tip would be faster than `TIP_SPEED`.
-
-    Raises
-    ------
-    UsageError
-        The scene has no posture.
+    have room; they are smaller where the tip would be faster than `TIP_SPEED`. UsageError if the scene has no posture.
     """
     usual = load_scene()
     if not scene.postures:
@@ -154,19 +143,9 @@ def _scaled(scene: Scene, first: Array, usual: Scene) -> Programme:
 
 
 def random_programme(scene: Scene, posture: str, duration: float, seed: int) -> Programme:
-    """Draw moves of one to three cylinders at once with holds between, in range and slower than `TIP_SPEED` at the tip.
+    """Draw moves from `posture` of one to three cylinders at once, in range and slower than `TIP_SPEED` at the tip.
 
-    Parameters
-    ----------
-    posture : str
-        Where it starts.
-    duration : float
-        Seconds; no move ends later than a hold before it.
-
-    Returns
-    -------
-    Programme
-        Strokes of all cylinders over time, from rest.
+    There are holds between, and one after the last move, within `duration` (s).
     """
     rng = np.random.default_rng(seed)
     first = strokes_of_posture(scene, posture)
@@ -184,19 +163,8 @@ def random_programme(scene: Scene, posture: str, duration: float, seed: int) -> 
 def through_postures(scene: Scene, postures: Sequence[str], duration: float, acceleration: float) -> Programme:
     """Return moves of all cylinders at once from posture to posture, with rest periods of one length in each.
 
-    Parameters
-    ----------
-    postures : sequence of str
-        In the order in which they are reached; a single one gives a boom that stands still.
-    duration : float
-        s, of moves and rest periods together.
-    acceleration : float
-        m/s^2, largest one of the undeformed boom's tip.
-
-    Raises
-    ------
-    UsageError
-        The moves take longer than `duration`.
+    The undeformed boom's tip accelerates by at most `acceleration` (m/s^2). A single posture gives a boom that stands still.
+    UsageError if moves and rest periods take longer than `duration` (s).
     """
     stops = [strokes_of_posture(scene, posture) for posture in postures]
     spans = [_span(scene, one, other, acceleration) for one, other in pairwise(stops)]

@@ -15,8 +15,7 @@ from ...errors import UsageError
 from ...types import SECOND, Array
 
 RATE = 200.0  # Hz
-RATES = 50.0, 1000.0
-"""Hz: jitter reaches half the time between two samples at 2500 Hz, and a motion is recorded at 1000 Hz."""
+RATES = 50.0, 1000.0  # Hz: jitter reaches half the time between two samples at 2500 Hz, and a motion is recorded at 1000 Hz
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,12 +23,7 @@ class Sensors:
     """Sampling and noise: Hz, s, m, rad, m/s^2, rad/s, N, N m, Pa; a resolution of zero means no rounding.
 
     Standard deviations are those before rounding. Forces are as of load pins, or of pressures in both chambers: 100 N is a
-    thousandth of what the largest cylinder of the default scene bears.
-
-    Raises
-    ------
-    UsageError
-        The rate is not from 50 to 1000 Hz.
+    thousandth of what the largest cylinder of the default scene bears. UsageError unless the rate is within `RATES`.
     """
 
     rate: float = RATE
@@ -75,21 +69,10 @@ def read(true: Array, sigma: float, resolution: float, rng: np.random.Generator)
 
 
 def specific_force(acceleration: Array, angle: Array, gravity: Array) -> Array:
-    """Return the reading of an ideal accelerometer on the tip: acceleration minus gravity in the tip's axes.
+    """Return the reading of an ideal accelerometer: acceleration minus gravity in its own axes, (m, 2) m/s^2.
 
-    Parameters
-    ----------
-    acceleration : ndarray, shape (m, 2)
-        Of the point, without gravity, in the base's axes (m/s^2).
-    angle : ndarray, shape (m,)
-        Of the last head to the base's x axis (rad).
-    gravity : ndarray, shape (2,)
-        In the base's axes (m/s^2).
-
-    Returns
-    -------
-    ndarray, shape (m, 2)
-        Along the last head outward, and 90 degrees anticlockwise from it (m/s^2).
+    `acceleration` (m, 2), without gravity, and `gravity` (2,) are in the base's axes, `angle` (m,) is that of the x axis
+    there, rad.
     """
     fx, fy = acceleration[:, 0] - gravity[0], acceleration[:, 1] - gravity[1]
     c, s = np.cos(angle), np.sin(angle)

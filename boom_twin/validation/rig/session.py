@@ -23,42 +23,23 @@ from .exudyn.solve import SITE, Change, Drive, TipLoad, simulate
 from .exudyn.system import Site
 from .sensors import Sensors, read, sampling_stamps, specific_force
 
-EPOCH = 1_700_000_000 * SECOND
-"""Stamp (ns) of the start of every session."""
+EPOCH = 1_700_000_000 * SECOND  # stamp (ns) of the start of every session
 POINT_PERIOD = 1.0  # s, of a total station
 BACK_PRESSURE = 1e6  # Pa
 
 
 @dataclass(frozen=True)
 class RigSession:
-    """Samples of all sensors, taken at common instants, with the truth at the same instants.
+    """Samples of all sensors, taken at common instants, with the truth at the same instants."""
 
-    Attributes
-    ----------
-    stamps, angle_stamps : ndarray of int64, shape (m,)
-        Nanoseconds; those of the joint angles are the same unless they come late.
-    strokes, joints : ndarray, shape (m, n)
-        Cylinder lengths pin to pin less `closed_length`, m, and joint angles, rad, as transducers read them.
-    imu : ndarray, shape (m, 2)
-        Specific force at the tip along its x and z; m/s^2.
-    forces : ndarray, shape (m, n)
-        Of the cylinders, positive in tension; N.
-    truth : dict of ndarray
-        ``t`` (m,) s after the start; ``strokes`` (the lengths), ``drives`` (m, n) m; ``joints`` (m, n) rad; ``forces``
-        (m, n) N; ``tip``, ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle`` (m,) rad; where there is one, the external force at the
-        tip ``load`` (m, 2) N.
-    placed : dict of Stream to ndarray, shape (m, channels)
-        Readings of sensors that have a place, and of the gyro at the tip.
-    """
-
-    stamps: NDArray[np.int64]
-    strokes: Array
-    joints: Array
-    imu: Array
-    angle_stamps: NDArray[np.int64]
-    forces: Array
-    truth: dict[str, Array]
-    placed: dict[Stream, Array] = field(default_factory=dict)
+    stamps: NDArray[np.int64]  # (m,), ns
+    strokes: Array  # (m, n), cylinder lengths pin to pin less `closed_length`, m, as transducers read them
+    joints: Array  # (m, n), rad
+    imu: Array  # (m, 2), specific force at the tip along its x and z, m/s^2
+    angle_stamps: NDArray[np.int64]  # (m,), ns; `stamps` unless angles come late
+    forces: Array  # (m, n), of the cylinders, positive in tension, N
+    truth: dict[str, Array]  # ``t`` (m,), ``strokes`` (lengths), ``drives``, ``joints``, ``forces``, ``tip``, ``load`` .., SI
+    placed: dict[Stream, Array] = field(default_factory=dict)  # of sensors that have a place, and the gyro at the tip
 
     def save_truth(self, path: Path) -> None:
         """Write the truth as a gzipped CSV; equal truths give equal bytes."""
@@ -71,7 +52,6 @@ class RigSession:
         write_atomic(path, content.getvalue())
 
     def _columns(self) -> list[tuple[str, int, Array]]:
-        """Return name with unit, decimals and values of every column of the truth."""
         truth, number = self.truth, range(self.strokes.shape[1])
         load = [] if "load" not in truth else [(f"tip_load_{axis}_N", 3, truth["load"][:, i]) for i, axis in enumerate("xy")]
         return [
@@ -112,21 +92,10 @@ def observe(
     places: Mapping[str, Place] = NO_PLACES,
     cylinders: Sequence[tuple[float, float]] = (),
 ) -> RigSession:
-    """Sample a simulated motion; stamps depend on the seed alone, not on the noise.
+    """Sample the motion `rows` that `simulate` gave for a drive and load; stamps depend on the seed alone, not on the noise.
 
-    Parameters
-    ----------
-    places : mapping of str to Place
-        Of IMUs beside that at the tip, strain gauges (``moment_1`` ..) and points; a point is seen once in `POINT_PERIOD`.
-    cylinders : sequence of (float, float)
-        Bore and rod (m) of every cylinder whose pressures are measured; empty without.
-    rows : dict of ndarray
-        What `simulate` gave for this drive and this load.
-
-    Returns
-    -------
-    RigSession
-        Samples of all sensors, and the truth beside them.
+    `places` are those of IMUs beside the one at the tip, strain gauges (``moment_1`` ..) and points, seen once in
+    `POINT_PERIOD`. `cylinders` are bore and rod (m) of all whose pressures are measured.
     """
     clock, stroke_noise, angle_noise, imu_noise, force_noise, *others = np.random.default_rng(seed).spawn(7 + len(places))
     stamps = sampling_stamps(sensors, float(rows["t_s"][-1]), EPOCH, clock)

@@ -93,7 +93,6 @@ def _sizes(lengths: Array) -> _Sizes:
 
 
 def _section(sizes: _Sizes, i: int, base_scale: float) -> Section:
-    """Return section `i`, flexible between a rigid root and a rigid head."""
     length, beam_mass = float(sizes.length[i]), float(sizes.per_metre[i] * sizes.length[i])
     root, head = (0.6 * base_scale if i == 0 else 0.08 * length), 0.08 * length
     second_moment = sizes.moment[i] * sizes.length.sum() / (BENT * sizes.modulus)

@@ -36,25 +36,14 @@ HEAD = ("variant", "at rest, mm", "moving, mm", "f1, %", "time saved, %")
 
 @dataclass(frozen=True)
 class VariantCost:
-    """One variant, its deviation from the full model, and its cost.
-
-    Attributes
-    ----------
-    shifts : ndarray, shape (`FREQUENCIES`,)
-        Relative change of the natural frequencies about the start of the move; NaN where one of the models has none.
-    step_time : float
-        s; NaN where the move fails.
-    unknowns : int
-    status : str
-        "ok", or why there are no numbers.
-    """
+    """One variant, its deviation from the full model, and its cost."""
 
     variant: Variant
     deviation: Deviation
-    shifts: Array
-    step_time: float
+    shifts: Array  # (`FREQUENCIES`,), relative, of natural frequencies at the start of the move; NaN if a model lacks one
+    step_time: float  # s; NaN where the move fails
     unknowns: int
-    status: str
+    status: str  # "ok", or why there are no numbers
 
 
 @dataclass(frozen=True)
@@ -81,10 +70,7 @@ class PartsStudy:
 def measure(scene: Scene, course: StrokeCourse, rounds: int = ROUNDS) -> PartsStudy:
     """Compare every variant of a scene with the scene itself; times are the least of `rounds`.
 
-    Raises
-    ------
-    SolverError
-        The scene itself has no equilibrium or fails in the move. A variant that does has a status.
+    SolverError if the scene itself has no equilibrium or fails in the move; a variant that does has a status.
     """
     found = variants(scene)
     full = answer(scene, course, FREQUENCIES)
@@ -108,10 +94,7 @@ def _part(scene: Scene, variant: Variant, found: Response, time: float, full: Re
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
-    """Measure, and write ``parts.json``, ``parts.md`` and ``parts.png`` into the folder `out`; returns their paths.
-
-    The move starts at `posture`; `quick`: it is short, and times are the least of few rounds.
-    """
+    """Measure in a move from `posture`; write parts.json, parts.md and parts.png into the folder `out`; return their paths."""
     course = course_of(scene, posture, QUICK_DURATION if quick else DURATION)
     found = measure(scene, course, QUICK_ROUNDS if quick else ROUNDS)
     paths = [out / f"parts.{kind}" for kind in ("json", "md", "png")]

@@ -37,7 +37,6 @@ def _version(package: str) -> str | None:
 
 
 def _cpu() -> str:
-    """Return the model of the processor, or its architecture."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -35,7 +35,7 @@ from boom_twin import Twin, load_scene
 from boom_twin.bag.session_files import samples_of
 from boom_twin.health.alarms import Alarms
 from boom_twin.twin.blocks import ReportBlock, block_of
-from boom_twin.types import NANO
+from boom_twin.types import NANO, Stream
 from boom_twin.validation.rig import Scheme, Sensors, at_rest, move, observe, random_programme
 from boom_twin.validation.rig.faults import parse, spoil
 from boom_twin.validation.rig.faulty_boom import changes, wrong_by
@@ -95,7 +95,8 @@ def row_of(number: int, causes: bool = False) -> dict[str, Any]:
     imu, forces = (getattr(seen, name) if name in streams else None for name in ("imu", "forces"))
     twin, alarms = Twin(scene, health=True, causes=causes), Alarms()
     first = int(seen.stamps[0])
-    samples = samples_of(seen.stamps, seen.strokes, seen.joints, imu, seen.angle_stamps, forces)
+    rows = {Stream.STROKES: seen.strokes, Stream.ANGLES: seen.joints, Stream.IMU: imu, Stream.FORCES: forces}
+    samples = samples_of(seen.stamps, {stream: each for stream, each in rows.items() if each is not None}, seen.angle_stamps)
     for report in twin.update_block(block_of(samples, len(scene.joints))):
         for health in report.health.values() if isinstance(report, ReportBlock) else [each.health for each in report.all]:
             if health is not None:

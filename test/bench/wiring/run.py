@@ -24,7 +24,8 @@ from bench.record import keep
 from recordings import read, scan, scene_of
 
 from boom_twin import Scene, load_scene, simulate
-from boom_twin.types import SENSORS, G, Stream, StrokeReading
+from boom_twin.sensor_kinds import G
+from boom_twin.types import SENSORS, Stream, StrokeReading
 from boom_twin.validation.rig.faulty_boom import wrong_by
 from boom_twin.validation.rig.motion import random_programme
 from boom_twin.wiring.check import Verdict, check
@@ -220,7 +221,7 @@ def judged(number: int) -> tuple[str, bool, Counter[str]]:
     rows = len(next(iter(wired.columns[STROKES].values())))
     stamps = 10**18 + np.arange(rows) * round(STEP * 1e9)
     window = {s: {name: Series(stamps, each) for name, each in own.items()} for s, own in wired.columns.items()}
-    found = check(wired.scene, StrokeReading.LENGTH, {s: wired.declared(s) for s in Stream}, window)
+    found = check(RestModel(wired.scene, StrokeReading.LENGTH), {s: wired.declared(s) for s in Stream}, window)
     counts: Counter[str] = Counter()
     assert found is not None
     for verdict in found.verdicts:

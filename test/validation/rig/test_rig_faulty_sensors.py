@@ -93,7 +93,8 @@ def test_faults_come_on_over_their_ramp_and_go(healthy):
 @pytest.mark.parametrize("cause, stream", [("joint_angles", Stream.ANGLES), ("cylinder_strokes", Stream.STROKES)])
 def test_missing_messages_are_not_there(healthy, cause, stream):
     session = spoil(healthy, [parse(f"{cause}.dropout:missing:0.5@{ONSET:g}")], 1)
-    kept = [s for s in samples_of(*(getattr(session, name) for name in ARRAYS)) if s.stream is stream]
+    rows = {Stream.STROKES: session.strokes, Stream.ANGLES: session.joints, Stream.IMU: session.imu}
+    kept = [s for s in samples_of(session.stamps, rows, session.angle_stamps) if s.stream is stream]
     assert all(np.isfinite(sample.values).all() for sample in kept)
     assert len(kept) == pytest.approx(800 + 0.5 * 1200, abs=80)
 

@@ -99,5 +99,5 @@ def test_a_file_that_is_there_is_kept(kind: str, tmp_path: Path, capsys: pytest.
         (out := tmp_path / name).mkdir()
         (out / name).write_text("mine")
         assert main(["study", kind, "--quick", "--out", str(out)]) == 1
-        assert f"{out}: holds {name}, and no manifest of a study {kind}" in capsys.readouterr().err
+        assert f"{out}: holds {name}, and no manifest of `boom_twin study {kind}`" in capsys.readouterr().err
         assert [path.read_text() for path in out.iterdir()] == ["mine"]

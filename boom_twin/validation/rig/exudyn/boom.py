@@ -55,7 +55,6 @@ def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSec
 
 
 def _station(boom: Boom, frame: Frame, x: float, own: list[Lump], borne: list[Lumps]) -> Station:
-    """Add a rigid frame with its `own` masses and with what it bears for its neighbours."""
     mass = masses.gather([*own, *(lump for lumps in borne for lump in lumps.inertia)], x)
     weight = masses.gather([*own, *(lump for lumps in borne for lump in lumps.weight)], x) if borne else None
     node = boom.node(frame.point((x, 0.0)), frame.angle)
@@ -192,7 +191,6 @@ def _six_bar(boom: Boom, frames: list[Frame], index: int) -> tuple[int, int, tup
 
 
 def _link(boom: Boom, link: Link, borne: Lumps | None = None) -> int:
-    """Add the body of a link, with what it bears for its neighbours."""
     node = boom.node(np.array([link.frame.x, link.frame.y]), link.frame.angle)
     if borne is None:
         return boom.body(node, link.mass, link.lump.com, link.lump.inertia)
@@ -221,10 +219,7 @@ def _drive(boom: Boom, cylinder: Cylinder, pins: tuple[int, int], stroke: float)
 def _cylinder_part(
     boom: Boom, part: CylinderPart | None, pins: tuple[int, int], ends: tuple[Array, Array], worn: Pin | None = None
 ) -> int:
-    """Add barrel or rod, pinned at its own end. Its axis goes through the other end, so the two parts slide on each other.
-
-    Return the marker of its own end, which is off the pin's where the pin is `worn`.
-    """
+    """Add barrel or rod, pinned at its own end; the two slide on each other. Return the marker of its end, worn or not."""
     if part is None or part.mass == part.inertia == 0.0:
         return pins[0]
     axis = ends[1] - ends[0]
@@ -258,24 +253,9 @@ def build(
 ) -> Boom:
     """Build the undeformed boom with its drives at absolute `strokes` (m), shape (n,). Sensors may still be added.
 
-    Parameters
-    ----------
-    elements : int
-        Finite elements per flexible section, at least one per part between cylinder brackets.
-    nodally_exact : bool
-        True if few elements bend as many do; see `shear_stiffness`.
-    lumped : bool
-        True if cylinders and two-force links are no bodies, their masses lumped; see `lumped_masses`.
-    shear_over_axial : float
-        GA over EA.
-    sites : tuple of Site
-        Where sensors are.
-
-    Raises
-    ------
-    UsageError
-        The scene has pins with clearance other than of rods, on a rod without mass, or in a lumped boom; a lumped boom has an
-        elastic base.
+    A flexible section has `elements` finite elements, at least one per part between cylinder brackets. `nodally_exact`: few
+    elements bend as many do, see `shear_stiffness`. `lumped`: see `lumped_masses`; it needs ideal pins and a rigid base.
+    Sensors are at `sites`. UsageError for worn pins other than of rods, and for a lumped boom that cannot be.
     """
     refuse_other_pins(scene)
     if lumped and any(pin_with_play(scene, index) is not None for index in range(len(scene.joints))):

@@ -40,18 +40,10 @@ class Lumps:
 
 @dataclass(frozen=True, slots=True)
 class LumpedMasses:
-    """Lumps that replace cylinders and links without a body of their own.
+    """Lumps that replace cylinders and links without a body of their own."""
 
-    Attributes
-    ----------
-    sections : list of dict
-        Lumps of every section by the pin's x (m), in the section's axes.
-    links : list of Lumps
-        Lumps on the bearing link of every joint, in its axes.
-    """
-
-    sections: list[dict[float, Lumps]]
-    links: list[Lumps]
+    sections: list[dict[float, Lumps]]  # lumps of every section by the pin's x (m), in the section's axes
+    links: list[Lumps]  # lumps on the bearing link of every joint, in its axes
 
     @classmethod
     def none(cls, count: int) -> LumpedMasses:
@@ -86,7 +78,6 @@ def _part(part: RigidPart | None) -> list[Lump]:
 
 
 def _tip(scene: Scene, index: int) -> list[Lump]:
-    """Return the payload if section `index` is the last one."""
     if scene.tip is None or not scene.tip.payload or index != len(scene.sections) - 1:
         return []
     return [Lump(scene.tip.payload, (scene.sections[index].length, 0.0), 0.0)]

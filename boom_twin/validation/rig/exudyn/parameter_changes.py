@@ -19,19 +19,9 @@ _BODY = "RigidBody2D"
 
 
 class ParameterChanges:
-    """Parameter differences between a boom and changed ones, with their share at every step.
+    """Parameter differences between a boom and fully `changed` ones, with their share (count + 1,) at the start and every step.
 
-    Parameters
-    ----------
-    boom : Boom
-        The moving boom.
-    changed : sequence of (Boom, ndarray of shape (count + 1,))
-        Fully changed booms with the same parts; share of each difference at the start and after every step.
-
-    Raises
-    ------
-    UsageError
-        A changed boom has other parts, or the boom is lumped (its masses are loads).
+    UsageError if a changed boom has other parts, or the boom is lumped (its masses are loads).
     """
 
     def __init__(self, boom: Boom, changed: Sequence[tuple[Boom, Array]]) -> None:

@@ -24,26 +24,13 @@ HOLD = 1e10  # N/m, of a journal that is held in the middle
 
 @dataclass(slots=True)
 class Bush:
-    """The contact of one pin as Exudyn asks for it.
-
-    Attributes
-    ----------
-    contact : Contact
-    sides : tuple of int
-        Markers of the hole and of the journal.
-    node : int
-        Of the rod, which moves with the journal.
-    held : bool
-        True if a spring holds the journal in the middle instead.
-    entry : float or None
-        Speed of approach (m/s) when it touched; None in flight.
-    """
+    """The contact of one pin as Exudyn asks for it."""
 
     contact: Contact
-    sides: tuple[int, int]
-    node: int
-    held: bool = True
-    entry: float | None = None
+    sides: tuple[int, int]  # markers of the hole and of the journal
+    node: int  # of the rod, which moves with the journal
+    held: bool = True  # True if a spring holds the journal in the middle instead
+    entry: float | None = None  # speed of approach (m/s) when it touched; None in flight
 
     def spring(self, _s: Any, _t: float, _i: int, offset: Array, rate: Array, _k: Any, _d: Any, _o: Any) -> list[float]:
         """Return the force (N) that draws hole and journal together, at the journal's offset (m) and rate (m/s), to Exudyn."""

@@ -53,16 +53,11 @@ def attach(boom: Boom) -> Probes:
 
 
 def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
-    """Return all recorded rows (m); if `at_rest`, one row with the present equilibrium.
+    """Return all recorded rows (m); if `at_rest`, one row with the present equilibrium. SI.
 
-    Returns
-    -------
-    dict
-        ``t`` (m,) s; ``tip``, ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle``, ``tip_rate``, ``tip_rate_dot`` (m,) rad,
-        rad/s, rad/s^2; ``joints`` (m, n) rad; ``forces`` (m, n) N, positive in tension; ``lengths`` (m, n) m, pin to pin
-        minus `closed_length`; ``sites`` (m, k, 7) x, y (m), their accelerations, angle (rad), its rate and the
-        bending moment by the curvature (N m; NaN off a beam);
-        ``pins`` (m, k, 2) m, offsets of the journals with play.
+    Keys: ``t`` (m,); ``tip``, ``tip_acc`` (m, 2); ``tip_angle``, ``tip_rate``, ``tip_rate_dot`` (m,); ``joints``, ``forces``
+    (tension), ``lengths`` (m, n; pin to pin less `closed_length`); ``sites`` (m, k, 7): x, y, their accelerations, angle, its
+    rate, bending moment by the curvature (NaN off a beam); ``pins`` (m, k, 2), offsets of the journals with play.
     """
     data = partial(_data, boom, at_rest=at_rest)
     roots = np.column_stack([_angle(data(p), s.root) for p, s in zip(probes.roots, boom.sections, strict=True)])
@@ -167,5 +162,4 @@ def _on_drive(boom: Boom, drive: int, kind: Any) -> int:
 
 
 def _sensor(boom: Boom, kind: Any, item: Any, **where: Any) -> int:
-    """Add a sensor that stores its values in memory only."""
     return int(boom.system.AddSensor(item(outputVariableType=kind, storeInternal=True, writeToFile=False, **where)))

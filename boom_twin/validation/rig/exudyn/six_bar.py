@@ -15,21 +15,13 @@ from .system import Frame
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A link as a uniform rod, with its frame at its middle.
+    """A link as a uniform rod, with its frame at its middle."""
 
-    Attributes
-    ----------
-    mass, length : float
-        kg, m.
-    apex, outer : Point
-        Pin shared with the other link, and pin on the section, m, in the axes of the link.
-    """
-
-    mass: float
-    length: float
+    mass: float  # kg
+    length: float  # m
     frame: Frame
-    apex: Point
-    outer: Point
+    apex: Point  # pin shared with the other link, m, in the axes of the link
+    outer: Point  # pin on the section
 
     @property
     def lump(self) -> Lump:
@@ -39,27 +31,15 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class SixBar:
-    """Both links and the cylinder's pins.
-
-    Attributes
-    ----------
-    bears_right : bool
-        True if the right link bears the rod pin.
-    rod_pin : Point
-        m, in the axes of the link that bears it.
-    bracket, hinge : Point
-        Barrel pin and pin of the left link, m, in the axes of the section before the joint.
-    turned_hinge : Point
-        Pin of the right link, m, in the axes of the section that the joint turns.
-    """
+    """Both links and the cylinder's pins."""
 
     left: Link
     right: Link
-    bears_right: bool
-    rod_pin: Point
-    bracket: Point
-    hinge: Point
-    turned_hinge: Point
+    bears_right: bool  # True if the right link bears the rod pin
+    rod_pin: Point  # m, in the axes of the link that bears it
+    bracket: Point  # barrel pin, m, in the axes of the section before the joint
+    hinge: Point  # pin of the left link there
+    turned_hinge: Point  # pin of the right link, m, in the axes of the section that the joint turns
 
     @property
     def bearing(self) -> Link:
@@ -89,7 +69,6 @@ def six_bar(scene: Scene, frames: list[Frame], index: int) -> SixBar:
 
 
 def _between(start: Array, end: Array) -> Frame:
-    """Return the frame in the middle of two points, its x axis from start to end."""
     middle = (start + end) / 2
     return Frame(float(middle[0]), float(middle[1]), math.atan2(end[1] - start[1], end[0] - start[0]))
 

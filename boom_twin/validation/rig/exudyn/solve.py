@@ -32,13 +32,7 @@ NUDGE = 1e-5  # m and rad, of the difference quotient
 
 
 def find_equilibrium(system: Any, aim: str) -> None:
-    """Bring an assembled system to rest under its full load; it is the start of what follows.
-
-    Parameters
-    ----------
-    aim : str
-        What is looked for, in words for an error.
-    """
+    """Bring an assembled system to rest under its full load; errors name the `aim`. What follows starts there."""
     residual, moving = _residual_of(system)
     data = system.systemData
     state = np.concatenate([data.GetODE2Coordinates(), data.GetAECoordinates()])
@@ -84,24 +78,18 @@ def _tangent(residual: Any, state: Array, moving: int) -> Array:
     return columns
 
 
-Drive = Callable[[Array], tuple[Array, Array]]
-"""Times (m,) in s -> absolute strokes (m, n) in m and their rates (m, n) in m/s."""
+Drive = Callable[[Array], tuple[Array, Array]]  # times (m,) in s -> absolute strokes (m, n) in m and their rates (m, n) in m/s
 
-TipLoad = Callable[[Array], Array]
-"""Times (m,) in s -> external force at the tip (m, 2) in N, in the base's axes; 0 at t = 0."""
+TipLoad = Callable[[Array], Array]  # times (m,) in s -> external force at the tip (m, 2) in N, in the base's axes; 0 at t = 0
 
 Change = tuple[Scene, Callable[[Array], Array]]
 """A scene that differs in stiffnesses or masses only; times (m,) in s -> share (m,) of the difference, 0 at t = 0."""
 
 
 def statics(scene: Scene, strokes: Array, elements: int = 16) -> dict[str, list[float]]:
-    """Solve the equilibrium under gravity at absolute `strokes` (m), shape (n,).
+    """Solve the equilibrium under gravity at absolute `strokes` (m), shape (n,). Return lists, SI, the base's axes.
 
-    Returns
-    -------
-    dict
-        ``stroke_m``, ``tip_rigid_m``, ``tip_m``, ``joint_rad``, ``cylinder_force_N``: lists, SI, the base's axes. There
-        are no frequencies, for Exudyn's eigenvalues lack the geometric stiffness.
+    There are no frequencies: Exudyn's eigenvalues lack the geometric stiffness.
     """
     strokes = np.asarray(strokes, float)
     boom = build(scene, strokes, elements)
@@ -129,32 +117,12 @@ def simulate(
     changes: Sequence[Change] = (),
     sites: tuple[Site, ...] = (),
 ) -> dict[str, Array]:
-    """Integrate the motion from rest in the equilibrium of the drive's first strokes.
+    """Integrate the motion from rest in the equilibrium of the drive's first strokes; return columns (rows,), SI.
 
-    Parameters
-    ----------
-    drive : callable
-        Times (m,) -> strokes and rates (m, n); the rates are zero at t = 0.
-    t_end, step, output_step : float
-        Seconds; both `t_end` and `output_step` are multiples of `step`.
-    elements : int
-        Finite elements per flexible section.
-    load : callable, optional
-        External force at the tip, see `TipLoad`.
-    changes : sequence of Change
-        How the boom changes meanwhile.
-    sites : tuple of Site
-        Places whose motion is recorded, too.
-
-    Returns
-    -------
-    dict
-        The columns of a simulation (``t_s``, ``stroke_1_m``, .., ``joint_1_rad``, .., ``tip_x_m``, ``tip_y_m``,
-        ``tip_ax_m_s2``, ``tip_ay_m_s2``, ``cylinder_force_1_N``, ..), then ``tip_angle_rad``,
-        ``tip_angular_velocity_rad_s``, ``tip_angular_acceleration_rad_s2``, ``length_1_m``, .., and of pins with play the
-        journals' offsets, ``cylinder_1_rod_dx_m``, ``cylinder_1_rod_dy_m``, ..; each of shape (rows,). Of the first site
-        ``site_1_x_m``, ``site_1_y_m``, ``site_1_ax_m_s2``, ``site_1_ay_m_s2``, ``site_1_angle_rad``, ``site_1_rate_rad_s``,
-        ``site_1_moment_Nm``.
+    Rates are zero at t = 0; `t_end` and `output_step` (s) are multiples of `step`. The columns are those of a simulation
+    (``t_s``, ``stroke_1_m``, .., ``joint_1_rad``, .., ``tip_x_m``, ``tip_ax_m_s2``, .., ``cylinder_force_1_N``, ..), angle,
+    rate and angular acceleration of the tip, ``length_1_m``, .., of every one of the `sites` those of `SITE` (``site_1_x_m``,
+    ..), and offsets of journals with play (``cylinder_1_rod_dx_m``, ..).
     """
     first = drive(np.zeros(1))[0][0]
     return move(at_rest(scene, first, elements, sites=sites), drive, t_end, step, output_step, None, load, changes)[0]
@@ -211,7 +179,6 @@ def move(
 
 
 def _built_alike(boom: Boom, scene: Scene, strokes: Array) -> Boom:
-    """Build the boom of another scene as `boom` was built."""
     return build(scene, strokes, boom.elements, boom.nodally_exact, boom.lumps is not None, boom.shear_over_axial, boom.sites)
 
 

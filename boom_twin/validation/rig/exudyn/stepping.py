@@ -23,60 +23,30 @@ FEW = 3  # passes with a kept tangent, below which tangents are many
 
 @dataclass(frozen=True, slots=True)
 class Scheme:
-    """Generalised-alpha with Newton's method.
+    """Generalised-alpha with Newton's method."""
 
-    Attributes
-    ----------
-    rho : float
-        Spectral radius at infinite frequency.
-    kept : int
-        Passes that a step may take with the tangent of earlier steps (Exudyn's modified Newton) before it is made anew;
-        0 makes it in every pass, 9 is Exudyn's own choice.
-    tolerance : float
-        Of a step, relative to its residual without accelerations and constraint forces; Exudyn's rounding allows no less
-        than 1e-6.
-    """
-
-    rho: float = 0.8
-    kept: int = 9
-    tolerance: float = 1e-6
+    rho: float = 0.8  # spectral radius at infinite frequency
+    kept: int = 9  # passes with the tangent of earlier steps before it is made anew; 0: anew in each, 9: Exudyn's choice
+    tolerance: float = 1e-6  # of a step, relative to its residual without accelerations and constraint forces; 1e-6 at least
 
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """Computing time and Newton passes of a motion.
+    """Computing time and Newton passes of a motion."""
 
-    Attributes
-    ----------
-    seconds : float
-        CPU time of Exudyn's stepping alone.
-    passes, tangents : int
-        Newton passes, and tangents made.
-    """
-
-    seconds: float
-    passes: int
-    tangents: int
+    seconds: float  # CPU time of Exudyn's stepping alone
+    passes: int  # of Newton's method
+    tangents: int  # made
 
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """Inputs to a boom in count + 1 rows, one for the start and one for every step.
+    """Inputs to a boom in count + 1 rows, one for the start and one for every step."""
 
-    Attributes
-    ----------
-    strokes, rates : ndarray, shape (count + 1, n)
-        m, m/s.
-    load : ndarray, shape (count + 1, 2), or None
-        External force at the tip, N, in the base's axes; at the start it is 0.
-    changes : ParameterChanges
-        Of stiffnesses and masses.
-    """
-
-    strokes: Array
-    rates: Array
-    load: Array | None
-    changes: ParameterChanges
+    strokes: Array  # (count + 1, n), m
+    rates: Array  # (count + 1, n), m/s
+    load: Array | None  # (count + 1, 2), external force at the tip, N, in the base's axes; at the start it is 0
+    changes: ParameterChanges  # of stiffnesses and masses
 
 
 def step_through(boom: Boom, course: Course, step: float, output_step: float, scheme: Scheme) -> Effort:
@@ -124,11 +94,7 @@ def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> An
 
 
 def _feed(boom: Boom, course: Course, step: float) -> None:
-    """Hand the moving drives, before every step, their lengths without force at its end.
-
-    All drives get those of the start at once. Pins with play note then whether they touch. Load and changed parameters are
-    those of the step's end, too.
-    """
+    """Hand the moving drives, before every step, their lengths without force at its end, and load and parameters there."""
     rests = [_rests(boom, i, course) for i in range(len(boom.drives))]
     moving = [(*drive, rest) for drive, rest in zip(boom.drives, rests, strict=True) if min(rest) < max(rest)]
     oils = [(drive[0], _stiffness(boom, i, course).tolist()) for i, drive in enumerate(boom.drives) if _cylinder(boom, i).oil]

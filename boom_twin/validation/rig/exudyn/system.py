@@ -73,47 +73,22 @@ class Site:
 
 @dataclass(slots=True)
 class Boom:
-    """An assembled system and the numbers by which its parts are found.
-
-    Attributes
-    ----------
-    container, system : object
-        Exudyn's SystemContainer and MainSystem.
-    base : Base
-        Carrier of the pivot and of cylinder 1.
-    sections : list of BuiltSection
-    nodally_exact : bool
-        True if a straight, lightly bent beam is exact at its nodes however few they are.
-    shear_over_axial : float
-        GA over EA.
-    elements : int
-        Finite elements per flexible section.
-    lumps : LumpedMasses or None
-        Masses of cylinders and two-force links, where these are no bodies.
-    drives : list of (int, str)
-        Connector of each cylinder, and the name of its length parameter.
-    bushes : list of Bush
-        Pins with play.
-    tip_load : int
-        The external force at the tip.
-    sites : tuple of Site
-        Where sensors are; the beams there have nodes.
-    """
+    """An assembled system of Exudyn and the numbers by which its parts are found."""
 
     scene: Scene
     container: Any
     system: Any
     gravity: list[float]
-    base: Base
-    nodally_exact: bool
-    shear_over_axial: float
-    elements: int
-    lumps: LumpedMasses | None
+    base: Base  # carrier of the pivot and of cylinder 1
+    nodally_exact: bool  # a straight, lightly bent beam is exact at its nodes however few they are
+    shear_over_axial: float  # GA over EA
+    elements: int  # finite elements per flexible section
+    lumps: LumpedMasses | None  # masses of cylinders and two-force links, where these are no bodies
     sections: list[BuiltSection] = field(default_factory=list)
-    drives: list[tuple[int, str]] = field(default_factory=list)
-    bushes: list[Bush] = field(default_factory=list)
-    tip_load: int = -1
-    sites: tuple[Site, ...] = ()
+    drives: list[tuple[int, str]] = field(default_factory=list)  # connector of each cylinder, name of its length
+    bushes: list[Bush] = field(default_factory=list)  # pins with play
+    tip_load: int = -1  # the external force at the tip
+    sites: tuple[Site, ...] = ()  # where sensors are; the beams there have nodes
 
     def marker(self, body: int, local: Point) -> int:
         """Add a marker on a rigid body, in the body's axes."""

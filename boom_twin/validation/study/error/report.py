@@ -113,7 +113,6 @@ def _varies_rest(case: Own) -> bool:
 
 
 def _by_label(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Return own rows that went through, by method."""
     groups: dict[str, list[Row]] = {}
     for row in of(rows, Own):
         if row.good:
@@ -130,15 +129,7 @@ TURNS, QUICK_TURNS = 5, 2  # runs of each program at the same step
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
-    """Run all cases on a motion of `scene`; write ``error.json``, ``error.md`` and pictures into `out`; return the paths.
-
-    Parameters
-    ----------
-    quick : bool
-        Run few cases on a short motion.
-    posture : str, optional
-        Start of the motion, see `motion_of`.
-    """
+    """Run all cases on a motion of `scene` from `posture`; write error.json, error.md and pictures; return the paths."""
     problem = pose(scene, motion_of(scene, posture, QUICK_DURATION if quick else DURATION), quick)
     cases: list[Case] = [*own_cases(scene, quick), *(peer_cases(quick) if problem.exudyn else ())]
     runner, rounds = Runner(problem), 1 if quick else ROUNDS
@@ -179,7 +170,6 @@ def report(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -
 
 
 def _setting(problem: Problem) -> str:
-    """Return the paragraphs on motion, error measures and run time."""
     own, other = problem.own, problem.exudyn
     second = f"There is no independent reference: {problem.missing}"
     if other is not None and problem.apart is not None:
@@ -212,7 +202,6 @@ def _by_step(rows: Sequence[Row]) -> str:
 
 
 def _equal(problem: Problem, rows: Sequence[Row]) -> str:
-    """Return a table of the fastest case of each program within each error bound of `EQUAL`."""
     if problem.exudyn is None:
         return problem.missing
     lines = []
@@ -251,7 +240,6 @@ def _methods(rows: Sequence[Row]) -> str:
 
 
 def _failed(rows: Sequence[Row]) -> str:
-    """Return a Markdown list of failure reasons with their cases."""
     cases: dict[str, list[str]] = {}
     for row in rows:
         if not row.good:
@@ -261,7 +249,6 @@ def _failed(rows: Sequence[Row]) -> str:
 
 
 def _ms(row: Row) -> float:
-    """Return CPU milliseconds per simulated second."""
     return 1e3 * row.seconds
 
 
@@ -286,7 +273,6 @@ def _content(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None)
 
 
 def _flat(row: Row) -> dict[str, Any]:
-    """Return a row as a flat dict, settings first."""
     settings = asdict(row.case)
     settings |= settings.pop("method", {})
     numbers = {key: value for key, value in vars(row).items() if key not in ("case", "status")}

@@ -22,32 +22,17 @@ LONG = 2.0  # s; a run of Exudyn that takes longer is not repeated in another ro
 
 @dataclass(frozen=True)
 class Row:
-    """Result of one case; NaN where it failed.
-
-    Attributes
-    ----------
-    own_mm, independent_mm : float
-        Error of the tip against the own and the independent reference, rms.
-    own_acceleration, independent_acceleration : float
-        Error of the tip's acceleration, relative.
-    seconds : float
-        CPU time of the stepping alone per simulated second.
-    steps : int
-    passes : float
-        Newton passes per step.
-    status : str
-        "ok", or why there are no numbers.
-    """
+    """Result of one case; NaN where it failed. Errors are rms, against the own and the independent reference."""
 
     case: Case
-    own_mm: float = math.nan
-    own_acceleration: float = math.nan
+    own_mm: float = math.nan  # of the tip
+    own_acceleration: float = math.nan  # of the tip, relative
     independent_mm: float = math.nan
     independent_acceleration: float = math.nan
-    seconds: float = math.nan
+    seconds: float = math.nan  # CPU time of the stepping alone per simulated second
     steps: int = 0
-    passes: float = math.nan
-    status: str = "ok"
+    passes: float = math.nan  # of Newton's method per step
+    status: str = "ok"  # or why there are no numbers
 
     @property
     def tip_mm(self) -> float:
@@ -79,14 +64,10 @@ class Runner:
             for case in cases:
                 if turn == 0:
                     found[case] = self.row(case)
-                elif self._again(found[case]):
-                    found[case] = replace(found[case], seconds=min(found[case].seconds, self.row(case).seconds))
+                elif (row := found[case]).good and (isinstance(case, Own) or row.seconds * self.problem.motion.duration < LONG):
+                    found[case] = replace(row, seconds=min(row.seconds, self.row(case).seconds))
                 tick()
         return list(found.values())
-
-    def _again(self, row: Row) -> bool:
-        brief = isinstance(row.case, Own) or row.seconds * self.problem.motion.duration < LONG
-        return row.good and brief
 
     def row(self, case: Case) -> Row:
         """Run one case once. Whatever it raises becomes its status."""
@@ -171,12 +152,9 @@ def order(rows: Sequence[Row]) -> list[tuple[Row, float | None]]:
 
 
 def same_step(runner: Runner, rows: Sequence[Row], turns: int) -> dict[str, Any] | None:
-    """Run the default and Exudyn's fastest at its step that is exact enough in turn, so that both meet the same machine.
+    """Run the default and Exudyn's fastest at its step that is exact enough in turn; None if none of its cases is.
 
-    Returns
-    -------
-    dict or None
-        Both cases, and CPU seconds per simulated second of every run; None if no case of Exudyn is exact enough.
+    Both meet the same machine so. Times are CPU seconds per simulated second of every run.
     """
     own = Own()
     peers = [row for row in of(rows, Peer) if row.case.step == own.step]

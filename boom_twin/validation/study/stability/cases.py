@@ -27,32 +27,16 @@ FULL_STROKE = 10.0  # s, duration of a full stroke at full speed
 
 @dataclass(frozen=True)
 class Setup:
-    """Scene, drive and steps of a case.
-
-    Attributes
-    ----------
-    scene : Scene
-    drive : Drive
-    angles : ndarray, shape (n,)
-        Approximate joint angles (rad) at the start.
-    duration, step : float
-        s.
-    still : float
-        Time (s) after which the drives stand still.
-    every : int
-        Steps per row.
-    jump : float
-        Time (s) of a jump in speed, or NaN. Accelerations and forces are impulses there, without a value.
-    """
+    """Scene, drive and steps of a case."""
 
     scene: Scene
     drive: Drive
-    angles: Array
-    duration: float
+    angles: Array  # (n,), approximate joint angles (rad) at the start
+    duration: float  # s
     step: float
-    still: float
-    every: int = 1
-    jump: float = math.nan
+    still: float  # time (s) after which the drives stand still
+    every: int = 1  # steps per row
+    jump: float = math.nan  # time (s) of a jump in speed, or NaN; accelerations and forces are impulses there, without a value
 
 
 @dataclass(frozen=True)
@@ -135,26 +119,14 @@ not grow about a mean that stays; nothing, because there is no solution."""
 
 @dataclass(frozen=True)
 class Case:
-    """One row of the matrix.
-
-    Attributes
-    ----------
-    group, name : str
-    varied : str
-        How scene, motion or step are derived.
-    make : callable
-        Returns the `Setup`.
-    truth : Truth
-    quick : bool
-        Whether it belongs to the quick subset.
-    """
+    """One row of the matrix."""
 
     group: str
     name: str
-    varied: str
-    make: Callable[[], Setup]
+    varied: str  # how scene, motion or step are derived
+    make: Callable[[], Setup]  # returns the `Setup`
     truth: Truth = "fine steps"
-    quick: bool = False
+    quick: bool = False  # whether it belongs to the quick subset
 
 
 def short(value: float) -> str:

@@ -29,32 +29,21 @@ MEANINGS = {
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None, soak: bool = False) -> list[Path]:
-    """Run the study; write stability.json, stability.md and stability.png into `out`; returns their paths.
+    """Run the study on motions from `posture`; write stability.json, stability.md and stability.png; return their paths.
 
-    Parameters
-    ----------
-    quick : bool
-        A subset of the cases.
-    posture : str, optional
-        Where motions of the scene start.
-    soak : bool
-        The holds of 24 simulated hours as well, by the default method.
+    `quick`: a subset of the cases. `soak`: the holds of 24 simulated hours as well, by the default method.
     """
     if posture is not None:
         scene = scene.model_copy(update={"postures": {posture: section_angles(scene, posture)}})
     chosen = [case for case in cases(scene) if case.quick or not quick]
     rows = run(chosen, METHODS, _progress)
     long_rows = run(long_holds(scene) if soak else (), {"default": METHODS["default"]}, _progress)
-    limits = {_title(row.case): limit_of(row.case.make()) for row in rows if _has_no_equilibrium(row)}
+    limits = {_title(row.case): limit_of(row.case.make()) for row in rows if NO_EQUILIBRIUM in row.cells["default"].status}
     return write_files(out, rows, long_rows, limits, move_in_words(scene))
 
 
 def _progress(line: str) -> None:
     print(line, file=sys.stderr)
-
-
-def _has_no_equilibrium(row: CaseResult) -> bool:
-    return NO_EQUILIBRIUM in row.cells["default"].status
 
 
 def _title(case: Case) -> str:
@@ -85,7 +74,7 @@ def text(rows: Sequence[CaseResult], long_rows: Sequence[CaseResult], limits: di
         f"1e-10 rad), or the equilibrium. The move: {move}. Cases make all or part of it, in 1 s unless stated otherwise. "
         "Accelerations and forces within 50 ms after a speed jump are impulses and are ignored.",
         "![Where each method holds](stability.png)",
-        "## Verdicts by method", _meanings(), _counts(rows),
+        "## Verdicts by method", "".join(f"- {mark}: {meaning}.\n" for mark, meaning in MEANINGS.items()), _counts(rows),
         "## The default",
         "All cases hold except:", _default(rows),
         "## Other methods",
@@ -99,10 +88,6 @@ def text(rows: Sequence[CaseResult], long_rows: Sequence[CaseResult], limits: di
         parts += ["## Holds of 24 simulated hours", _long(long_rows)]
     parts += ["Limits: one move. Cases with another geometry use invented booms."]
     return page(parts)
-
-
-def _meanings() -> str:
-    return "".join(f"- {mark}: {meaning}.\n" for mark, meaning in MEANINGS.items())
 
 
 def _counts(rows: Sequence[CaseResult]) -> str:
@@ -123,7 +108,6 @@ def _default(rows: Sequence[CaseResult]) -> str:
 
 
 def _others(rows: Sequence[CaseResult]) -> str:
-    """Return one entry for all methods that are worse than the default in the same cases."""
     ranks = {mark: rank for rank, mark in enumerate(("holds", "refuses", "degrades", "fails", "silent"))}
     methods: dict[str, list[str]] = {}
     for method in rows[0].cells:
@@ -158,7 +142,6 @@ def _long(rows: Sequence[CaseResult]) -> str:
 
 
 def _content(rows: list[CaseResult], limits: dict[str, Limit]) -> dict[str, Any]:
-    """Return everything that was found."""
     silent = [(row.case, method) for row in rows for method, cell in row.cells.items() if cell.verdict.silent]
     return {
         "methods": METHODS,

@@ -75,13 +75,7 @@ def one(case: Case, methods: dict[str, Method]) -> CaseResult:
 
 
 def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]:
-    """Return the function that judges a motion of the case, and its reference in words.
-
-    Raises
-    ------
-    SolverError
-        No equilibrium to start from.
-    """
+    """Return the function that judges a motion of the case, and its reference in words; SolverError without equilibrium."""
 
     def unsolvable(found: MethodRun) -> Facts:
         return Facts(found.status, solvable=False, doubt=found.doubt, passes=found.passes)
@@ -99,7 +93,9 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]
             return unsolvable, f"{NOTHING}: the reference ended, {right.status}"
         told = f"default method at {step:.3g} s"
         return lambda found: ended(found) or against_motion(_thinned(found, stride), right, setup.still, setup.jump), told
-    rest = _equilibrium(setup) if case.truth == "equilibrium" else None
+    rest = None  # the tip (m) at rest at the last strokes
+    if case.truth == "equilibrium":
+        rest = rest_at(setup.scene, *_strokes(setup, setup.duration))[1].frames[-1, :2].copy()
     told = "equilibrium of the last strokes" if rest is not None else "a vibration that does not grow about a mean that stays"
     return lambda found: ended(found) or against_rest(found, rest, setup.still, setup.every), told
 
@@ -109,7 +105,6 @@ def _march(setup: Setup, step: float, every: int, method: Method) -> MethodRun:
 
 
 def _thinned(motion: MethodRun, stride: int) -> MethodRun:
-    """Return the motion with every `stride`-th row."""
     names = ("times", "tip", "tip_acceleration", "joints", "cylinder_forces")
     return replace(motion, **{name: getattr(motion, name)[::stride] for name in names})
 
@@ -118,11 +113,6 @@ def _strokes(setup: Setup, time: float) -> tuple[Array, Array]:
     """Return strokes (m) at a time (s), and joint angles (rad) of the undeformed boom there."""
     strokes = setup.drive(np.array([time]))[0][0]
     return strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles)
-
-
-def _equilibrium(setup: Setup) -> Array:
-    """Return the tip (m), shape (2,), at rest at the last strokes."""
-    return rest_at(setup.scene, *_strokes(setup, setup.duration))[1].frames[-1, :2].copy()
 
 
 @dataclass(frozen=True)

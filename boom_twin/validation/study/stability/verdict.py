@@ -23,44 +23,20 @@ TINY = 1e-12  # m/s^2 or N, least divisor
 
 @dataclass(frozen=True)
 class Facts:
-    """Deviations of a motion from its reference. A quantity that does not apply to the case is NaN.
+    """Deviations of a motion from its reference. A quantity that does not apply to the case is NaN."""
 
-    Attributes
-    ----------
-    status : str
-        "ok", or the reason for an early end of the motion.
-    solvable : bool
-        True if a solution exists.
-    doubt : str
-        Warning that the simulation gave, see `analysis.doubts`.
-    error : float
-        Largest tip error, relative to the tip's path.
-    acceleration, force : float
-        Rms error of the tip acceleration, relative to its rms; of the cylinder forces, relative to the largest force.
-    ringing, force_ringing : float
-        Rms of the part that alternates from step to step while the drives hold, relative to the peak.
-    growth : float
-        Ratio of vibration in the last quarter of the hold to the first, relative to the reference's ratio.
-    drift : float
-        Distance from equilibrium, or shift of the mean, at the end of a long hold, relative to the tip's path.
-    lasting : float
-        Steps after a speed jump until cylinder forces are correct again.
-    passes : float
-        Newton passes per step.
-    """
-
-    status: str
-    solvable: bool = True
-    doubt: str = ""
-    error: float = math.nan
-    acceleration: float = math.nan
-    force: float = math.nan
-    ringing: float = math.nan
-    force_ringing: float = math.nan
-    growth: float = math.nan
-    drift: float = math.nan
-    lasting: float = math.nan
-    passes: float = math.nan
+    status: str  # "ok", or the reason for an early end of the motion
+    solvable: bool = True  # True if a solution exists
+    doubt: str = ""  # warning of the simulation, see `analysis.doubts`
+    error: float = math.nan  # largest tip error, relative to the tip's path
+    acceleration: float = math.nan  # rms error of the tip acceleration, relative to its rms
+    force: float = math.nan  # rms error of the cylinder forces, relative to the largest
+    ringing: float = math.nan  # rms of what alternates from step to step while the drives hold, relative to the peak
+    force_ringing: float = math.nan  # likewise of the cylinder forces
+    growth: float = math.nan  # ratio of vibration in the last quarter of the hold to the first, relative to the reference's
+    drift: float = math.nan  # distance from equilibrium, or shift of the mean, after a long hold, over the path
+    lasting: float = math.nan  # steps after a speed jump until cylinder forces are correct again
+    passes: float = math.nan  # of Newton's method per step
 
     @property
     def verdict(self) -> CaseVerdict:

@@ -1,0 +1,60 @@
+"""Streams whose clock is not that of the strokes: lag and drift are estimated, and the estimate is as with right stamps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin import Sample, Stream, Twin, load_scene, statics
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.types import SECOND, Array
+
+SCENE = load_scene()
+LENGTHS = statics(SCENE, strokes=strokes_of_posture(SCENE, "arch")).lengths
+STEP = 10_000_000  # ns
+NOISE = 2e-4  # rad
+
+
+def lengths_at(times: Array, amplitude: float) -> Array:
+    return LENGTHS + amplitude * (1.0 - np.cos(np.outer(times, [0.9, 0.7, 1.2, 0.5])))
+
+
+def angles_of(times: Array, amplitude: float) -> Array:
+    """What a twin on the lengths alone predicts."""
+    twin = Twin(SCENE)
+    rows = [twin.update(Sample(Stream.STROKES, k * STEP, row)) for k, row in enumerate(lengths_at(times, amplitude))]
+    return np.array([row.prediction.joints for row in rows])
+
+
+def samples(times: Array, angles: Array, amplitude: float, lag: float, drift: float) -> list[Sample]:
+    """Strokes, and angles that arrive when they are read, with the stamps of another clock."""
+    noise, found = np.random.default_rng(4).normal(0.0, NOISE, angles.shape), []
+    for k, (time, lengths) in enumerate(zip(times.tolist(), lengths_at(times, amplitude), strict=True)):
+        found.append(Sample(Stream.STROKES, k * STEP, lengths))
+        stamp = k * STEP + round((lag + drift * time) * SECOND)
+        if k and stamp > 0:
+            found.append(Sample(Stream.ANGLES, stamp, angles[k] + noise[k]))
+    return found
+
+
+@pytest.mark.parametrize(("lag", "drift"), [(0.0, 0.0), (-0.02, 5e-5), (0.04, -5e-5)])
+def test_lag_and_drift_are_estimated_where_joints_move(lag: float, drift: float) -> None:
+    """Within 3 deviations and 1 ms; the residuals are those of right stamps."""
+    times, amplitude = np.arange(0.0, 40.0, 1e-9 * STEP), 0.03
+    twin, residuals = Twin(SCENE, lagging=[Stream.ANGLES]), []
+    for sample in samples(times, angles_of(times, amplitude), amplitude, lag, drift):
+        residuals += [each for each in twin.update(sample).residuals if each.stream is Stream.ANGLES]
+    clock = twin.clocks[Stream.ANGLES]
+    assert clock.lag == pytest.approx(lag + drift * times[-1], abs=min(1e-3, 3.0 * clock.lag_sigma))
+    assert clock.drift == pytest.approx(drift, abs=3.0 * clock.drift_sigma) and clock.drift_sigma < 4e-5
+    late = np.array([each.values for each in residuals[len(residuals) // 2 :]])
+    assert late.std() == pytest.approx(NOISE, rel=0.1)
+
+
+def test_a_boom_at_rest_tells_nothing_of_a_lag() -> None:
+    times = np.arange(0.0, 20.0, 1e-9 * STEP)
+    twin = Twin(SCENE, lagging=[Stream.ANGLES])
+    for sample in samples(times, angles_of(times, 0.0), 0.0, -0.02, 0.0):
+        twin.update(sample)
+    clock = twin.clocks[Stream.ANGLES]
+    assert abs(clock.lag) < clock.lag_sigma and clock.lag_sigma > 0.02

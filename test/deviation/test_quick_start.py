@@ -1,0 +1,25 @@
+"""The start of a quick move is the move of a drive, not a load that has come."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin import load_scene, replay, simulate, statics
+
+
+@pytest.mark.parametrize(("cylinder", "travel", "seconds"), [(4, -0.04, 1.0), (1, 0.05, 1.5), (3, 0.03, 1.0)])
+def test_a_quick_start_is_no_load(cylinder, travel, seconds, tmp_path):
+    scene, rng = load_scene(), np.random.default_rng(5)
+    times = np.arange(0.0, 6.0, 0.005)
+    share = np.clip((times - 2.5) / seconds, 0.0, 1.0)
+    strokes = np.tile(statics(scene, "arch").strokes, (len(times), 1))
+    strokes[:, cylinder - 1] += travel * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    boom = simulate(scene, times, strokes, estimate_errors=False)
+    lengths = boom.lengths + rng.normal(0.0, 2e-5, boom.lengths.shape)
+    rows = {"t_s": times} | {f"cylinder_{i + 1}": column for i, column in enumerate(lengths.T)}
+    found = replay(rows, scene, tmp_path / "out", with_bag=False)
+    columns = found.columns()
+    tip = np.column_stack([columns["tip_x_m"], columns["tip_y_m"]])
+    assert np.abs(tip - boom.tip[:, :2]).max() < 0.01
+    assert not found.summary["alarms"]
