@@ -122,13 +122,30 @@ class Twin(SampleTaker):
         return found
 
     def model(self, settings: Settings) -> LoadedModel:
-        """Return the model under the load of `settings`, for `requests.tune`; another thread may call this."""
+        """Return the model under the load of `settings`, for `requests.tune`; another thread may call this.
+
+        Parameters
+        ----------
+        settings : Settings
+
+        Returns
+        -------
+        LoadedModel
+        """
         return self._model(settings)
 
     def zeros(self, channels: Collection[str]) -> tuple[Array, Array]:
-        """Return the estimated zeros of sensors of angles, IMU and forces (m/s^2, rad, N), and their variances.
+        """Return the estimated zeros of sensors of angles, IMU and forces, and their variances.
 
-        Both are in the order IMU, angles, forces of those `channels`, such as ``joint_2``.
+        Parameters
+        ----------
+        channels : collection of str
+            Names such as ``joint_2``; the results are in the order IMU, angles, forces.
+
+        Returns
+        -------
+        values, variances : ndarray, shape (channels,)
+            m/s^2, rad, N, and their squares.
         """
         return self._boom.zeros(channels)
 
@@ -183,7 +200,19 @@ class Twin(SampleTaker):
         return self._told(sample, self._fail(sample, []) if reason == FAILED else self._look_at(sample))
 
     def samples(self, readings: Mapping[str, Any], stamp_ns: int | None) -> list[Sample]:
-        """Return a sample of each stream of readings by name, as `update` takes them, strokes first."""
+        """Return a sample of each stream of readings by name, strokes first; raises as `update` does.
+
+        Parameters
+        ----------
+        readings : mapping of str to float or sequence
+            As for `boom_twin.twin.readings.samples_of`.
+        stamp_ns : int
+            Time of the readings, ns.
+
+        Returns
+        -------
+        list of Sample
+        """
         found = samples_of(readings, stamp_ns, self.plan.joints)
         if self._run is None:
             check_units(found)
@@ -209,7 +238,14 @@ class Twin(SampleTaker):
     def update_block(self, block: SampleBlock) -> list[ReportBlock | Report]:
         """Take the samples of a block in turn, as `update` does each of them, and raise as it does.
 
-        Return, in the order of the samples, blocks of reports of regular samples, and a report of every other sample.
+        Parameters
+        ----------
+        block : SampleBlock
+
+        Returns
+        -------
+        list of ReportBlock or Report
+            In the order of the samples: blocks of reports of regular samples, and a report of every other sample.
         """
         found: list[ReportBlock | Report] = []
         block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
