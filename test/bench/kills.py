@@ -27,13 +27,14 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from command import main as command_line
+from default_boom import strokes_of_posture
+from recordings import read, recover, scan, write_session
+
 from boom_twin import BagError, load_scene
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.recovery.recover import recover
-from boom_twin.bag.session_files import write_session
 from boom_twin.bag.session_sheet import incompleteness
-from boom_twin.cli.main import main as command_line
-from boom_twin.scene.kinematics import strokes_of_posture
 
 PATIENCE = 300.0
 STEP = 5_000_000
@@ -316,7 +317,6 @@ def main() -> int:
     names = args.commands.split(",")
     if "record" not in names:
         return _run(names, args.count, args.seed)
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
     from demo.isolation import isolated
 
     with isolated():

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 
 from boom_twin import Sample, Stream, Twin, load_scene, statics
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import ReportBlock, block_of
 from boom_twin.types import SECOND, Array
 

@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ros_messages import SampleDecoder, Topics, imu, joint_state, load_topics
+from ros_messages import SampleDecoder, Topics, imu, joint_state, load_topics, new_message
 
-from boom_twin import Stream
-from boom_twin.errors import UsageError
+from boom_twin import Stream, UsageError
 from boom_twin.messages.mapping import mapping_from
 from boom_twin.messages.sample_decoder import MOST_NAMES, ODDITIES
 from boom_twin.messages.topic_table import Sensor, usual
-from boom_twin.messages.type_store import new_message
 from boom_twin.types import SENSORS
 
 FINITE = st.floats(-1e6, 1e6)

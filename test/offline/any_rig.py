@@ -6,14 +6,14 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from default_boom import default_text
 from recordings import MessageWriter, SessionSheet, sensor_message
+from ros_messages import jazzy
 
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.bag.session_writer import named_message
 from boom_twin.messages.topic_table import every_input
-from boom_twin.messages.type_store import jazzy
 from boom_twin.offline.ground_truth import FILE_NAME
-from boom_twin.scene.load import default_text
 from boom_twin.types import SECOND, Place
 from boom_twin.validation.rig import loads, random_programme, record
 from boom_twin.validation.rig.session import RigSession
