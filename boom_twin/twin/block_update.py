@@ -19,7 +19,6 @@ from ..kernels.result_row import PIN
 from ..predictions import Outline
 from ..types import Health, Report, Residuals, Stream
 from .blocks import CODES, STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
-from .load_shedding import LoadShedding
 from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, ROOM, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .update import DONE, LOOK, update
@@ -37,6 +36,37 @@ class _UpdateExtras:
 NO_EXTRAS = _UpdateExtras()
 _Code = Callable[..., tuple[int, int]]  # `update`, compiled for a scene's types
 _Held = tuple[_Code, tuple[Any, ...], Any]  # with boom, limits and state, and output, see `boom_twin.kernels.jit.hold`
+
+
+SHAPES_ABOVE, HEALTH_ABOVE = 0.5, 0.75
+"""Share of the queue of samples that is filled, above which shapes and then health too are left out; at 1 samples are lost."""
+
+
+class LoadShedding:
+    """Decision, by the fill level of the sample queue, what to skip: shapes first, then the judgement of health.
+
+    Predictions, estimates and residuals are never skipped, and do not depend on what is. A sensor that fails meanwhile is
+    detected late: until then the estimate still uses it. A replay has no queue and skips nothing. `shapes` and `health` count
+    what was left out.
+    """
+
+    def __init__(self) -> None:
+        self.shapes = self.health = 0
+        self._share = 0.0
+
+    def filled(self, share: float) -> None:
+        """Set the fill level of the queue, 0 to 1, when the next sample is taken."""
+        self._share = share
+
+    def leaves_out_shape(self) -> bool:
+        """Return True if the shape that is due must be skipped; count it."""
+        self.shapes += (is_due := self._share > SHAPES_ABOVE)
+        return is_due
+
+    def leaves_out_health(self) -> bool:
+        """Return True if the judgement of the rig's health that is due must be skipped; count it."""
+        self.health += (is_due := self._share > HEALTH_ABOVE)
+        return is_due
 
 
 class BlockUpdate:

@@ -34,9 +34,8 @@ from ..types import (
     streams_of,
 )
 from .adjustments import Requests, ResidualBuffer, SensorZeros
-from .block_update import BlockUpdate
+from .block_update import BlockUpdate, LoadShedding
 from .blocks import CODES, SampleBlock
-from .load_shedding import LoadShedding
 from .loaded_model import LoadedModel, limits_of, loaded_model
 from .regular import SHORTEST_STEP, near
 from .run import Run

@@ -9,7 +9,7 @@ from drive_twin import drive_twin
 from ros_messages import Output, ReportEncoder
 
 from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
-from boom_twin.twin.load_shedding import HEALTH_ABOVE, SHAPES_ABOVE
+from boom_twin.twin.block_update import HEALTH_ABOVE, SHAPES_ABOVE
 
 SECONDS, RATE = 8, 100
 BUSY = range(3 * RATE, 5 * RATE)

@@ -22,8 +22,8 @@ from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import ODDITIES, SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
+from ...twin.block_update import LoadShedding
 from ...twin.events import EVENTS, TOLD_AT_ONCE
-from ...twin.load_shedding import LoadShedding
 from ...twin.twin import Twin
 from ...types import NANO, Stream
 from ...types import Clock as StreamClock

@@ -10,7 +10,7 @@ from ...reduction import variants
 from ...scene.edit import scaled, with_rigid_cylinders
 from ...scene.oil_spring import middle_stiffness
 from ...scene.schema import Cylinder, Joint, Scene, Section, Tip
-from ...scene.summary import explain
+from ...scene.summary import mass_of
 
 STEEL_LAG = 3e-3  # s, damping over stiffness of a cylinder that names no stiffness
 
@@ -60,7 +60,7 @@ def cylinder_parts(scene: Scene, keys: tuple[str, ...], factor: float) -> Scene:
 
 def loaded(scene: Scene, share: float) -> Scene:
     """Return the scene with a payload of `share` times the boom's mass."""
-    mass = explain(scene.model_copy(update={"tip": None})).mass
+    mass = mass_of(scene.model_copy(update={"tip": None}))
     return scene.model_copy(update={"tip": Tip(payload=share * mass)})
 
 
