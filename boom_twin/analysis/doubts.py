@@ -112,7 +112,6 @@ def row_errors(course: DriveCourse, own: Run) -> tuple[EstimatedError, ...]:
 
 
 def _compared(times: Array, found: Results, other: Run, factor: float) -> tuple[EstimatedError, ...]:
-    """Errors of `found`; without bound where the other run failed."""
     if other.status == OK:
         return differences(times, found, other.rows, factor)
     return tuple(

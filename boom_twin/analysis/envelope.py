@@ -82,7 +82,6 @@ def envelope(scene: Scene, progress: Callable[[int, int], None] = lambda done, t
 
 
 def _grid(scene: Scene) -> list[Array]:
-    """Relative joint angles (rad) over all ranges, as many of each as fit into `MOST_POSTURES` postures."""
     count = max(2, min(FINEST, int(MOST_POSTURES ** (1.0 / len(scene.joints)) + 1e-9)))
     axes = [np.radians(np.linspace(*joint.range_deg, count)) for joint in scene.joints]
     return [np.array(angles) for angles in product(*axes)]

@@ -127,7 +127,6 @@ def integrate_with(
 
 
 def _row_count(duration: float, step: float, every: int) -> int:
-    """Return the number of rows after the first."""
     rows = round(duration / (step * every))
     if rows < 1 or abs(rows * step * every - duration) > 1e-6 * step:
         raise UsageError(f"duration = {duration:g} s: not a multiple of {every} steps of {step:g} s. Choose one that is.")

@@ -83,7 +83,6 @@ class _AtRest:
 
 
 def _checked(status: int, count: int, omega: float) -> tuple[float, int]:
-    """Return frequency (rad/s) and count; SolverError if counting failed."""
     if status != OK:
         told = f"vibration at {omega / (2.0 * math.pi):.6g} Hz cannot be computed"
         raise SolverError(f"{told}: {SENTENCES[status]}. {ABSURD}")
@@ -130,7 +129,6 @@ def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, low
 
 
 def _nudge(plan: Plan, increments: Array) -> float:
-    """Return the multiple of `increments` of the unknowns by which derivatives are taken."""
     return NUDGE / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)
 
 

@@ -241,7 +241,6 @@ def course_of(
 
 
 def _checked_force(times: Array, force: Array) -> Array:
-    """Return rows of time (s), x and y (N); UsageError as for `simulate`."""
     if force.shape == (len(times), 2):
         force = np.column_stack([times, force])
     if force.ndim != 2 or force.shape[1] != 3 or not len(force):

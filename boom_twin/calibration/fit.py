@@ -98,7 +98,6 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callab
 
 
 def _shortened(problem: CalibrationProblem, at: Array, step: Array, noise: Noise, base: Array) -> Array:
-    """Return the step, halved until it makes the fit better."""
     before = likelihood_cost(base) + 0.5 * at @ at
     for _ in range(HALVINGS):
         (found,) = problem.innovations([problem.values(at + step)], noise)
@@ -116,7 +115,6 @@ def _mean_squares(problem: CalibrationProblem, base: Array) -> Array:
 
 
 def _score(slopes: Array, base: Array) -> tuple[Array, Array]:
-    """Return the score of each reading, (p, r), and the Fisher information, (p, p)."""
     innovation, variance = base.T
     by_innovation, by_variance = slopes[:, :, 0], slopes[:, :, 1] / variance
     excess = innovation**2 / variance - 1.0

@@ -81,7 +81,6 @@ def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path
 
 
 def _in_readings(found: Calibration, joints: int) -> dict[str, float]:
-    """Return the new zeros by channel, in the units of the readings."""
     sensors = {name: sensor for stream in Stream for name, sensor in found.mapped.topics.sensors_of(stream, joints).items()}
     return {name: sensors[name].zero + shift / factor(name, sensors[name]) for name, shift in found.zeros.items()}
 
@@ -115,7 +114,6 @@ def as_text(found: Calibration) -> list[str]:
 
 
 def _summary(found: Calibration) -> str:
-    """Return the result in one sentence."""
     changed = [estimate for estimate in found.estimates if estimate.has_changed]
     names = ", ".join(" ".join(part for part in (e.unknown.name, _row(e)[4].lstrip("* ")) if part) for e in changed)
     untold = sum(not estimate.told for estimate in found.estimates)

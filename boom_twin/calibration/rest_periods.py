@@ -87,7 +87,6 @@ def _without_gaps(strokes: Series) -> list[Series]:
 
 
 def _rests(boom: BoomPredictor, strokes: Series) -> list[tuple[int, int]]:
-    """Return first and last stamp (ns) of the rest periods."""
     boom.start(strokes.values[0], may_move=True)
     t, anchor, live, work, posture, filters, _, row = boom.compiled
     drives, opened = np.zeros(strokes.values.shape), np.zeros(len(strokes.stamps), np.bool_)
@@ -107,7 +106,6 @@ def _rests(boom: BoomPredictor, strokes: Series) -> list[tuple[int, int]]:
 
 
 def _period(session: MeasuredSession, start: int, stop: int) -> RestPeriod:
-    """Return what all sensors read between two stamps (ns)."""
     stamps, channels, values, first = [], [], [], 0
     joints = session.series[Stream.STROKES].values.shape[1]
     for stream in STREAMS:

@@ -204,7 +204,6 @@ def _parts(sessions: Sequence[MeasuredSession]) -> tuple[int, list[tuple[Measure
 
 
 def _refuse_other_boom(scene: Scene, sessions: Sequence[MeasuredSession]) -> None:
-    """Raise BagError where strokes are beyond the travel of the scene's cylinders."""
     for session in sessions:
         strokes = session.series[Stream.STROKES].values
         for i, joint in enumerate(scene.joints):

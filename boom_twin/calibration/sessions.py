@@ -105,7 +105,6 @@ def _measured(session: Session, samples: SessionSamples, joints: int) -> Measure
 
 
 def _series(samples: list[Sample]) -> Series:
-    """Return samples by stamp, the first of equal ones."""
     stamps, first = np.unique(np.array([sample.stamp for sample in samples]), return_index=True)
     return Series(stamps, np.array([samples[i].values for i in first]))
 

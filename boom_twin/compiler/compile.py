@@ -68,8 +68,6 @@ class _Pin:
 
 
 class _Builder:
-    """Walks a scene from the base to the tip."""
-
     def __init__(self, scene: Scene, basis: BasisName) -> None:
         self.scene, self.basis, self.layout = scene, basis, Layout()
         self.beam_tables: list[tuple[Array, Array, Array, Array, Array]] = []
@@ -201,7 +199,6 @@ class _Builder:
         return pins
 
     def _stations(self, pins: list[_Pin], frame: float) -> None:
-        """Pins on a rigid part or cross-section whose frame sits at `frame` along the section."""
         for pin in pins:
             self.layout.operate(pin.kind, self.layout.add("outlets", cylinder=pin.cylinder, x=pin.x - frame, y=pin.y))
 
@@ -222,7 +219,6 @@ class _Builder:
         return parts + self._with_line(None, 0.0, section.length)
 
     def _with_line(self, part: RigidPart | None, x0: float, x1: float) -> list[RigidPart]:
-        """A rigid part and the line's fill from x0 to x1, those that are named."""
         parts = [] if part is None else [part]
         if self.scene.line_fill and x1 - x0 > SAME_PLACE:
             parts.append(_rod(self.scene.line_fill, x0, x1))
@@ -308,7 +304,6 @@ class _Builder:
 
 
 def _rod(mass_per_length: float, x0: float, x1: float) -> RigidPart:
-    """A thin rod from x0 to x1 along the section."""
     mass = mass_per_length * (x1 - x0)
     return RigidPart(mass=mass, com=((x0 + x1) / 2, 0.0), inertia=mass * (x1 - x0) ** 2 / 12)
 

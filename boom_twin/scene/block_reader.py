@@ -260,7 +260,6 @@ def _value_fault(document: Document, root: type[BaseModel], detail: ErrorDetails
 
 
 def _length_fault(document: Document, detail: ErrorDetails, place: Place, give: str) -> Fault:
-    """Return the fault of a list with too few or too many entries."""
     if detail["type"] == "missing":
         place = place[:-1]
     value = detail["input"]
@@ -274,7 +273,6 @@ def _length_fault(document: Document, detail: ErrorDetails, place: Place, give: 
 
 
 def _what(value: Any) -> str:
-    """Return the type of a value in plain words."""
     if isinstance(value, bool):
         return "true or false"
     if isinstance(value, str):
@@ -287,7 +285,6 @@ def _what(value: Any) -> str:
 
 
 def _number_remedy(value: Any, give: str) -> str:
-    """Return the remedy for a value that should be a number."""
     if not isinstance(value, str):
         return give
     text = value.strip()

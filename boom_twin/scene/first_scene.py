@@ -124,7 +124,6 @@ def _section(table: BoomTable, section: BoxSection, first: float | None) -> list
 
 
 def _end(per_metre: float, start: float, stop: float, height: float) -> tuple[dict[str, Any], str]:
-    """Return a rigid end, and its formula."""
     length = stop - start
     mass = ENDS * per_metre * length
     values = {"mass": mass, "com": [0.5 * (start + stop), 0.0], "inertia": mass * (length**2 + height**2) / 12}
@@ -203,7 +202,6 @@ def _postures(table: BoomTable) -> list[str]:
 
 
 def _item(rows: list[Row]) -> list[str]:
-    """Return the lines of a block of a list, a key a line."""
     lines = []
     for number, (key, value, told) in enumerate(rows):
         text = value if isinstance(value, str) else yaml_text(value)  # words stand without quotes
@@ -247,7 +245,6 @@ def in_table(faults: Sequence[Fault], table: Document) -> list[Fault]:
 
 
 def _at_origin(fault: Fault, places: list[Place], table: Document) -> Fault:
-    """Return the fault at the first of `places` that is in the table, else at the first."""
     place = next((place for place in places if table.written(place) is not None), places[0])
     written = table.written(place)
     value = f" = {fault.value:.4g}" if isinstance(fault.value, float) else ""

@@ -138,7 +138,6 @@ def text_of(document: Mapping[str, Any]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return values of NumPy as Python's, tuples as lists."""
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -164,7 +164,6 @@ class BlockUpdate:
             self._begin = self._told = 0, 0
 
     def _look_around(self, run: Run | None, row: int) -> None:
-        """Add the shape, event and health request of a prediction that begins a slot or is outside the model's validity."""
         clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
         if self._news is NO_EXTRAS:
             self._news = _UpdateExtras()

@@ -131,7 +131,6 @@ class ModelPreparation:
             self._thread = None
 
     def _go_on(self) -> None:
-        """Request the settings if no other model is needed or the needed one is ready; else make the model."""
         requests, made = self._twin.requests, self._made
         settings = requests.settings.tuned(self._asked)
         if settings.load == requests.settings.load or (made is not None and made[0] == settings):

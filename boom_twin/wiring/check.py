@@ -145,7 +145,6 @@ class _Checker:
         return sum(float(costs[at]) for at, each in plain.channels.items() if own[at[0]] == at[:2] and each == declared[at[0]])
 
     def _common(self, stream: Stream) -> list[tuple[float, int | None, bool]]:
-        """Return every (prior cost, unit, reversal) that the sensors of a stream may share."""
         units, own = list(SENSORS[stream].units), self._declared[stream][0].unit
         ways = product((None, *range(len(units))), (False,) if stream is Stream.STROKES else (False, True))
         return [
@@ -183,7 +182,6 @@ class _Checker:
         return {strokes: prior for strokes, (_, prior) in kept}
 
     def _explained(self, strokes: tuple[Channel, ...], prior: float) -> _Explanation:
-        """Return an explanation with the best ways to read all other sensors."""
         table, units = self._tables[Stream.STROKES], SENSORS[Stream.STROKES].units
         columns = [si(each, units, table.values[:, table.names.index(each.name)]) for each in strokes]
         expected = self._model.expected(np.column_stack(columns))
@@ -203,7 +201,6 @@ class _Checker:
         return _Explanation(strokes, expected, parts, prior + sum(part.cost for part in parts.values()))
 
     def _part(self, stream: Stream, expected: Expected, cube_of: Callable[[], Cube]) -> _Part:
-        """Return the best ways to read a stream, over all common units and reversals."""
         declared, names = self._declared[stream], self._tables[stream].names
         costs = declared_costs(stream, self._tables[stream], declared, expected, self._weight)
         is_known = {each.name for each in declared}.issuperset(names)

@@ -117,8 +117,6 @@ def ways(base: Channel, units: Mapping[str, float]) -> list[Channel]:
 
 
 class _Builder:
-    """Collector of the costs of one stream."""
-
     def __init__(self, n: int, names: int, units: Mapping[str, float]) -> None:
         self._shape, self._units = (n, names), list(units)
         self._cells: dict[tuple[int, int], list[tuple[float, Channel, Channel]]] = {}
@@ -157,7 +155,6 @@ def declared_costs(
 
 
 def _force_error(expected: Expected, j: int) -> Array:
-    """Return the standard deviation of a cylinder's force in each block, N."""
     return np.asarray(
         FORCE_SHARE * np.abs(expected.forces[:, j]) + FORCE_LEAST * np.nanmax(np.abs(expected.forces), initial=1.0)
     )
@@ -310,7 +307,6 @@ class _Curves(NamedTuple):
 
 
 def _curves(scene: Scene, j: int, encoders: Encoders) -> _Curves:
-    """Return the strokes of joint j from the encoders, for all their hypotheses."""
     tracks, costs = list[Array](), list[float]()
     units, (table, declared, is_in_order) = SENSORS[Stream.ANGLES].units, encoders
     low, high = np.radians(scene.joints[j].range_deg)

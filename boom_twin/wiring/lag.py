@@ -69,5 +69,4 @@ def _less_mean(spans: NDArray[np.int64], values: Array) -> Array:
 
 
 def _summed(spans: NDArray[np.int64], values: Array) -> Array:
-    """Return the sums over each span, shape (spans, channels)."""
     return np.column_stack([np.bincount(spans, column, spans.max() + 1) for column in values.T])

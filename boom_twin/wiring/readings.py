@@ -74,14 +74,12 @@ def tables_of(window: Window) -> dict[Stream, Table]:
 
 
 def _means(series: Series) -> tuple[NDArray[np.int64], Array]:
-    """Return the numbers of the blocks that have readings, and the means of these."""
     is_read = np.isfinite(series.values)
     numbers, places, counts = np.unique(series.stamps[is_read] // BLOCK, return_inverse=True, return_counts=True)
     return numbers, np.bincount(places, series.values[is_read], len(numbers)) / np.maximum(counts, 1)
 
 
 def _chosen(common: NDArray[np.int64], strokes: list[Array]) -> NDArray[np.int64]:
-    """Return the numbers of the blocks to compare."""
     if not len(common):
         return common
     rows = set(np.linspace(0, len(common) - 1, EVENLY).round().astype(int).tolist())

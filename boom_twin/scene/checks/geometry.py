@@ -235,7 +235,6 @@ def _sizes_to_meet(row: np.record, degrees: Array) -> str:
 
 
 def _turns(lengths: Array) -> NDArray[np.int64]:
-    """Return the indices at which lengths, NaN out of reach, stop growing or shrinking."""
     slope = np.sign(np.diff(lengths))
     return np.flatnonzero(slope[1:] * slope[:-1] < 0) + 1
 
@@ -274,7 +273,6 @@ def _reached(joint: Joint, lengths: Array) -> Mask:
 
 
 def _postures(draft: Draft, i: int) -> Iterator[tuple[str, float]]:
-    """Return the names of the complete postures, and the angle (deg) at which each holds joint `i`."""
     for name, angles in draft.postures.items():
         if len(angles) == len(draft.joints):
             yield name, angles[i] - (angles[i - 1] if i > 0 else 0.0)
