@@ -85,7 +85,6 @@ class SampleTaker:
         self._begin()
 
     def _begin(self) -> None:
-        """Reset state, model, estimate, health and zeros to those before the first sample."""
         self._state = new_state(len(self.scene.joints), np.array(self._widths), self._room)
         self._state.clock[NEWEST] = NONE
         self._adopt(self._model(self.settings))
@@ -97,7 +96,6 @@ class SampleTaker:
         self._recent = ResidualBuffer(self._state.recent, self._channels)
 
     def _maker(self) -> Callable[[Hypothesis], Follower]:
-        """Return a function that makes twins of booms with faults, with the settings as they are now."""
         kind, settings = cast(Any, type(self)), self.settings
 
         def make(each: Hypothesis) -> Follower:
@@ -113,11 +111,9 @@ class SampleTaker:
         return self.judge.suspected, self.judge.failing_strokes
 
     def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
-        """Leave out measured channels (in the order of the streams), and strokes, from now on."""
         self._boom.leave_out(masked, strokes)
 
     def _restart(self) -> None:
-        """Forget all samples."""
         self._begin_anew()
         self._lines = self._new_lines()
         self._state.waiting.bounds[:] = 0
@@ -183,7 +179,6 @@ class SampleTaker:
         self._compiled.begin_health()
 
     def _advance_one(self, sample: Sample, trusted: bool = False) -> int:
-        """Take a sample if it is regular, or `trusted`; see `BlockUpdate.advance`."""
         one = self._one
         one.streams[0], one.stamps[0], self._row[: len(sample.values)] = CODES[sample.stream], sample.stamp, sample.values
         reason, _ = self._compiled.advance(self._run, one, trusted)
@@ -242,7 +237,6 @@ class SampleTaker:
         return replace(reports[-1], earlier=tuple(reports[:-1]))
 
     def _rebase(self, run: Run, shift: int) -> None:
-        """Shift stamps by `shift` (ns) from now on; the model continues."""
         before = run.newest
         run.rebase(shift)
         self._boom.rebase(shift)
@@ -314,7 +308,6 @@ class SampleTaker:
         return self._compiled.report(sample.stamp, events, self._judged)
 
     def _fail(self, sample: Sample, events: list[str]) -> Report:
-        """Reset the model, which failed at this stroke sample; return the report."""
         self._restart()
         self._failed = sample.stamp
         return self._refuse(sample, "model", *events, status=SENTENCES[int(self._state.clock[STATUS])])
@@ -339,7 +332,6 @@ class SampleTaker:
         return replace(reports[-1], earlier=tuple(reports[:-1]))
 
     def _compare(self, sample: Sample, complete: bool) -> Report:
-        """Take a measured sample and return its report; its residuals come now or once its strokes have come."""
         self._lines[sample.stream].take(sample.stamp)
         events: tuple[str, ...] = ()
         if not complete:
@@ -355,5 +347,4 @@ class SampleTaker:
         return Report(sample.stamp, held, events=events, status=status)
 
     def _is_complete(self, sample: Sample) -> bool:
-        """Return True if no sensor's reading is missing, not finite or absurd."""
         return bool((np.abs(sample.values) <= LIMIT)[self._there[sample.stream]].all())
