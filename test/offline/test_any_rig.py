@@ -22,7 +22,7 @@ def test_its_mapping_is_proposed_and_the_estimate_is_as_good(
 ) -> None:
     """Lag within 3 ms, mount within 0.3 deg, no alarm; bounds of the tip and of 0.12 m/s^2.
 
-    Under a pump that starts with a move the tip is 1.3 to 3 mm off, with the usual sensors at 200 Hz as well.
+    Under a pump that starts with a move the tip is millimetres off, with the usual sensors at 200 Hz as well.
     """
     bag, out = write(tmp_path / "session", motion(seed, is_pumped, DURATION), KNOWN), tmp_path / "mapping.yaml"
     assert main(["mapping", "--check", str(bag), "--out", str(out)]) == 0
