@@ -25,6 +25,7 @@ THINGS = {
     "cylinder_forces": "cylinder forces",
     "tip": "tip",
     "k": "oil spring of cylinder {n}",
+    "drive": "cylinder {n}",
     "EI": "section {n}",
     "stiffness": "base",
 }
@@ -58,6 +59,10 @@ SENTENCES = {
         "the force at the tip is above its limit",
         "Stop the pump, free the end hose, see if the boom touches anything",
         True,
+    ),
+    "creeps": Sentence(
+        "{thing} changes its length slowly and evenly",
+        "If nobody moves it, put the boom down, then look for a leak of its load-holding valve",
     ),
     "softer k": Sentence(
         "{thing} is softer than the scene says", "Finish the move, then look for air in the oil and loose pins"

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..analysis.bending_moments import stations
 from ..analysis.bending_stress import BendingStressModel
-from ..deviation.load_spectrum import LEAST, TipLoadFinder
+from ..deviation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms, repeated, values_of
 from ..health.deviations import KIND as DEVIATION
 from ..health.sensor_monitor import noise_as_text
@@ -193,7 +193,7 @@ class LoadWatch:
         load, self.explanation = finder.load, ""
         if load is None:
             return None
-        if load.rms >= LEAST or load.is_there:
+        if load.is_there:
             self.explanation = "a load at the tip moves the boom"
         judge.note({"rms_N": load.rms, "rms_sigma_N": load.sigma})
         if (pulses := load.pulses) is not None:

@@ -22,6 +22,7 @@ from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
 from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, evidence_of, hypothesis, possible_faults
+from .creep import SPAN, CreepMonitor
 from .sensor_check import Flags
 
 SIZES = 0.4, 0.7, 1.0, 1.4, 1.8  # trial sizes over the hypothesised size, to estimate the size of a named fault
@@ -29,6 +30,7 @@ CERTAIN = 3.0  # least size of a named fault in its standard deviations
 CAME_BACK = 0.3  # remaining share of a zero's change, below which the fault has ended
 SPACING = 18_000_000  # ns, least time between samples of a stream: 50 Hz suffice for all motion of the boom
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
+WARM_UP = 10  # s of recent samples that new twins take first: they start at rest, and the boom may be moving
 DELAY = 2 * SECOND  # ns from the end of a second to its verdict
 
 
@@ -98,6 +100,8 @@ class FaultTwins:
         self._results: deque[tuple[int, Future[list[Alarm]]]] = deque()
         self._recent: deque[_Second] = deque(maxlen=MEMORY)
         self._change: Change | None = None
+        self._creep = CreepMonitor(scene)
+        self._leaking: dict[int, Alarm] = {}  # by cylinder
         self._named: dict[Fault, Alarm] = {}
         self._zeros_before: dict[str, tuple[int, float]] = {}  # place among a sensor's zeros, and its value before the onset
         self._begin()
@@ -176,13 +180,20 @@ class FaultTwins:
         for fault, faults in [(None, known), *fewer, *more]:
             try:
                 each = hypothesis(self._scene, faults)
-                self._twins.append(self._made(each))
+                twin = self._made(each)
+                for second in list(self._recent)[-WARM_UP:]:
+                    _feed(twin, each, second)
+                self._twins.append(twin)
             except BoomTwinError:  # an impossible boom, such as one with a part too soft to hold it
                 continue
             self._hypotheses.append(each)
             self._faults += [] if fault is None else [fault]
+        self._decide_anew()
+
+    def _decide_anew(self) -> None:
+        """Discard all evidence of faults."""
         self._decision, self._age = Evidence(self._faults, self._odds), 0
-        self._evidence = np.zeros(len(self._twins))
+        self._evidence = np.array([twin.evidence for twin in self._twins])
 
     def _made(self, each: Hypothesis) -> Follower:
         twin = self._make(each)
@@ -197,28 +208,58 @@ class FaultTwins:
             self._change = second.change
             for each, twin in zip(self._hypotheses, self._twins, strict=True):
                 twin.requests.repeat(_changed(second.change, each))
+            self._decide_anew()
             return []
         self._recent.append(second)
+        if self._reads is not StrokeReading.ANGLE:
+            self._creep.take(second.stamp, second.block)
+        if leaks := self._leaks(second.stamp):
+            self._decide_anew()
         for each, twin in zip(self._hypotheses, self._twins, strict=True):
             _feed(twin, each, second)
+        return [*leaks, *self._decided(second.stamp)]
+
+    def _leaks(self, stamp: int) -> list[Alarm]:
+        """Return the alarms of creeping cylinders that begin or end."""
+        news, creeping = list[Alarm](), self._creep.creeping
+        for i in [i for i in self._leaking if i not in creeping]:
+            news.append(replace(self._leaking.pop(i), until=stamp))
+        for i, each in creeping.items():
+            if each.is_told and i not in self._leaking:
+                name = f"cylinder_{i + 1}"
+                told = f"by {1e3 * each.rate:+.2g} mm/s, {1e3 * each.change:+.2g} mm up to now"
+                self._leaking[i] = Alarm(name, "creeps", each.onset, None, f"{name}.drive", told)
+                news.append(self._leaking[i])
+        return news
+
+    def _decided(self, stamp: int) -> list[Alarm]:
+        """Return the alarms of named faults that begin or end with the evidence of a second."""
         before, self._evidence = self._evidence, np.array([twin.evidence for twin in self._twins])
         grown = self._evidence - before
         self._age += 1
         if self._age <= SETTLING:
             return []
         if (fault := self._back_again()) is not None:
-            return self._ended(fault, second.stamp)
-        verdict = self._decision.take(second.stamp, grown[1:] - grown[0])
-        return [] if verdict is None else self._name(verdict)
+            return self._ended(fault, stamp)
+        verdict = self._decision.take(stamp, grown[1:] - grown[0])
+        return [] if verdict is None else self._name(verdict, stamp)
 
-    def _name(self, verdict: Verdict) -> list[Alarm]:
-        """Name the fault of a verdict, or end it if it is named; return its alarm."""
+    def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
+        """Name the fault of a verdict, or end it if it is named; return its alarm.
+
+        A cylinder that creeps looks softer. So a softer one is named once it could have been seen to creep.
+        """
         fault = self._faults[verdict.place]
+        if fault.cause.startswith("cylinder_") and fault.kind == "softer" and fault not in self._named:
+            if int(fault.channel.removeprefix("cylinder_")) - 1 in self._creep.creeping:
+                self._decide_anew()
+            if stamp - verdict.onset < SPAN * SECOND:
+                return []
         if fault in self._named:
             return self._ended(fault, verdict.onset)
         sized, spread = self._sized(fault, verdict.onset)
         if abs(sized.size) < CERTAIN * spread:
-            self._decision = Evidence(self._faults, self._odds)
+            self._decide_anew()
             return []
         ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
         evidence = evidence_of(sized, spread) if fault.is_told else ""

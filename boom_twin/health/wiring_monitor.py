@@ -19,7 +19,7 @@ from ..wiring.check import Checked, check
 from ..wiring.expected import RestModel
 from ..wiring.readings import Channel, Series, Window, is_checked
 from ..wiring.words import channel_name, likely
-from .blocks import Block
+from .blocks import Block, means_of
 
 KIND = "wiring"  # kind of all its alarms
 CHECKS = 6, 20, 50, 100, 200, 400  # blocks after a start, at the end of which all of them are checked
@@ -117,7 +117,7 @@ class WiringMonitor:
             means = {Stream.STROKES: strokes}
             for stream in self._wrong:
                 if stream is not Stream.STROKES and (rows := block.readings(stream)) is not None:
-                    means[stream] = np.where(failing[stream] & self._right[stream], np.nan, _means(rows.raw))
+                    means[stream] = np.where(failing[stream] & self._right[stream], np.nan, means_of(rows.raw))
             self._blocks.append((block.start, means))
         self._age += 1
         if self._age in CHECKS:
@@ -187,10 +187,3 @@ class WiringMonitor:
 
 def _chosen(names: tuple[str, ...], chosen: NDArray[np.bool_]) -> list[str]:
     return [name for name, is_chosen in zip(names, chosen.tolist(), strict=True) if is_chosen]
-
-
-def _means(raw: Array) -> Array:
-    """Return the means of readings (k, channels); NaN of none."""
-    is_read = np.isfinite(raw)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(is_read, raw, 0.0).sum(axis=0) / is_read.sum(axis=0))

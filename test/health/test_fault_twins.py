@@ -54,7 +54,7 @@ def test_a_softer_part_is_named(tmp_path, capsys, cause):
 
 def test_sample_by_sample_as_by_blocks():
     """A twin that takes samples one by one names the same causes, with the same reports of health, as one that takes blocks."""
-    scene, samples = stiffer("cylinder_2.k"), session(16.0)
+    scene, samples = stiffer("cylinder_2.k"), session(20.0)
     one, many = (Twin(scene, health=True, causes=True) for _ in range(2))
     single = [report.health for sample in samples for report in one.update(sample).all if report.health is not None]
     found = []

@@ -1,0 +1,71 @@
+"""Monitor of cylinders that creep: their lengths change slowly and evenly, as an operator hardly moves them.
+
+A leak makes a cylinder creep. The joint's angle sensor turns with it; if it does not, the stroke transducer drifts.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..scene.kinematics import strokes_of_angles
+from ..scene.schema import Scene
+from ..types import SECOND, Array, Stream
+from .blocks import means_of
+
+SPAN, PARTS = 12, 4  # s in which lengths change evenly, several strokes of a pump; parts of it whose means are compared
+UNEVEN = 0.4  # largest relative difference of the rates between parts, and of the rates by length and by angle
+SLOWEST, FASTEST = 1e-4, 3e-3  # m/s, rates of creeping: above noise, and below what valves are opened for
+CREPT = 4e-3  # m, least change of length for an alarm: more than the oil of a spring that softens gives way
+
+
+class Creep(NamedTuple):
+    """Creeping of a cylinder since `onset` (ns): mean rate (m/s) and change of length (m), positive if it extends."""
+
+    onset: int
+    rate: float
+    change: float
+
+    @property
+    def is_told(self) -> bool:
+        """Return True if it is long enough for an alarm."""
+        return abs(self.change) >= CREPT
+
+
+class CreepMonitor:
+    """Monitor of mean lengths and angles, one second after the other.
+
+    Attributes
+    ----------
+    creeping : dict of int to Creep
+        By cylinder, from 0.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self.creeping = scene, dict[int, Creep]()
+        self._seconds: deque[tuple[int, Array]] = deque(maxlen=SPAN)
+
+    def take(self, stamp: int, block: Any) -> None:
+        """Take the samples of a second that begins at a stamp (ns)."""
+        if self._seconds and stamp - self._seconds[-1][0] != SECOND:
+            self._seconds.clear()
+        count, codes = len(self._scene.joints), list(Stream)
+        lengths, angles = (
+            means_of(block.values[block.streams == codes.index(stream), :count]) for stream in (Stream.STROKES, Stream.ANGLES)
+        )
+        self._seconds.append((stamp, np.stack([lengths, strokes_of_angles(self._scene, angles)])))
+        if len(self._seconds) < SPAN:
+            self.creeping.clear()
+            return
+        parts = np.array([each for _, each in self._seconds]).reshape(PARTS, -1, 2, count).mean(axis=1)
+        rates = np.diff(parts[:, 0], axis=0) * PARTS / SPAN
+        rate, by_angle = (parts[-1] - parts[0]) / (SPAN - SPAN / PARTS)
+        is_slow = (np.abs(rate) > SLOWEST) & (np.abs(rate) < FASTEST) & (np.abs(by_angle - rate) < UNEVEN * np.abs(rate))
+        is_even = (np.abs(rates - rate) < UNEVEN * np.abs(rate)).all(axis=0)
+        for i in range(count):
+            old = self.creeping.pop(i, None)
+            if is_slow[i] and (is_even[i] or old is not None):
+                onset = self._seconds[0][0] if old is None else old.onset
+                self.creeping[i] = Creep(onset, float(rate[i]), float(rate[i]) * (stamp + SECOND - onset) / SECOND)
