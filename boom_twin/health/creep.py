@@ -17,6 +17,7 @@ from .blocks import means_of
 
 SPAN, PARTS = 12, 4  # s in which lengths change evenly, several strokes of a pump; parts of it whose means are compared
 UNEVEN = 0.4  # largest relative difference of the rates between parts, and of the rates by length and by angle
+SWING = 1e-3  # m, by which pump and wind change the mean length from second to second; several short moves change it by more
 SLOWEST, FASTEST = 1e-4, 3e-3  # m/s, rates of creeping: above noise, and below what valves are opened for
 CREPT = 4e-3  # m, least change of length for an alarm: more than the oil of a spring that softens gives way
 
@@ -59,10 +60,12 @@ class CreepMonitor:
         if len(self._seconds) < SPAN:
             self.creeping.clear()
             return
-        parts = np.array([each for _, each in self._seconds]).reshape(PARTS, -1, 2, count).mean(axis=1)
+        seconds = np.array([each for _, each in self._seconds])
+        parts = seconds.reshape(PARTS, -1, 2, count).mean(axis=1)
         rates = np.diff(parts[:, 0], axis=0) * PARTS / SPAN
         rate, by_angle = (parts[-1] - parts[0]) / (SPAN - SPAN / PARTS)
         is_slow = (np.abs(rate) > SLOWEST) & (np.abs(rate) < FASTEST) & (np.abs(by_angle - rate) < UNEVEN * np.abs(rate))
+        is_slow &= (np.abs(np.diff(seconds[:, 0], axis=0) - rate) < UNEVEN * np.abs(rate) + SWING).all(axis=0)
         is_even = (np.abs(rates - rate) < UNEVEN * np.abs(rate)).all(axis=0)
         for i in range(count):
             old = self.creeping.pop(i, None)
