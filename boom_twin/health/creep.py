@@ -6,13 +6,14 @@ A leak makes a cylinder creep. The joint's angle sensor turns with it; if it doe
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..scene.kinematics import strokes_of_angles
 from ..scene.schema import Scene
-from ..types import SECOND, Array, Stream
+from ..types import SECOND, Alarm, Array, Stream
 from .blocks import means_of
 
 SPAN, PARTS = 12, 4  # s in which lengths change evenly, several strokes of a pump; parts of it whose means are compared
@@ -29,11 +30,6 @@ class Creep(NamedTuple):
     rate: float
     change: float
 
-    @property
-    def is_told(self) -> bool:
-        """Return True if it is long enough for an alarm."""
-        return abs(self.change) >= CREPT
-
 
 class CreepMonitor:
     """Monitor of mean lengths and angles, one second after the other.
@@ -47,9 +43,10 @@ class CreepMonitor:
     def __init__(self, scene: Scene) -> None:
         self._scene, self.creeping = scene, dict[int, Creep]()
         self._seconds: deque[tuple[int, Array]] = deque(maxlen=SPAN)
+        self._alarms: dict[int, Alarm] = {}  # by cylinder
 
-    def take(self, stamp: int, block: Any) -> None:
-        """Take the samples of a second that begins at a stamp (ns)."""
+    def take(self, stamp: int, block: Any) -> list[Alarm]:
+        """Take the samples of a second that begins at a stamp (ns); return the alarms that begin or end."""
         if self._seconds and stamp - self._seconds[-1][0] != SECOND:
             self._seconds.clear()
         count, codes = len(self._scene.joints), list(Stream)
@@ -59,7 +56,7 @@ class CreepMonitor:
         self._seconds.append((stamp, np.stack([lengths, strokes_of_angles(self._scene, angles)])))
         if len(self._seconds) < SPAN:
             self.creeping.clear()
-            return
+            return self._news(stamp)
         seconds = np.array([each for _, each in self._seconds])
         parts = seconds.reshape(PARTS, -1, 2, count).mean(axis=1)
         rates = np.diff(parts[:, 0], axis=0) * PARTS / SPAN
@@ -72,3 +69,14 @@ class CreepMonitor:
             if is_slow[i] and (is_even[i] or old is not None):
                 onset = self._seconds[0][0] if old is None else old.onset
                 self.creeping[i] = Creep(onset, float(rate[i]), float(rate[i]) * (stamp + SECOND - onset) / SECOND)
+        return self._news(stamp)
+
+    def _news(self, stamp: int) -> list[Alarm]:
+        gone = [i for i in self._alarms if i not in self.creeping]
+        news = [replace(self._alarms.pop(i), until=stamp) for i in gone]
+        for i, each in self.creeping.items():
+            if abs(each.change) >= CREPT and i not in self._alarms:
+                name, told = f"cylinder_{i + 1}", f"by {1e3 * each.rate:+.2g} mm/s, {1e3 * each.change:+.2g} mm up to now"
+                self._alarms[i] = Alarm(name, "creeps", each.onset, None, f"{name}.drive", told)
+                news.append(self._alarms[i])
+        return news

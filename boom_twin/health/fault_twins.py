@@ -101,7 +101,6 @@ class FaultTwins:
         self._recent: deque[_Second] = deque(maxlen=MEMORY)
         self._change: Change | None = None
         self._creep = CreepMonitor(scene)
-        self._leaking: dict[int, Alarm] = {}  # by cylinder
         self._named: dict[Fault, Alarm] = {}
         self._zeros_before: dict[str, tuple[int, float]] = {}  # place among a sensor's zeros, and its value before the onset
         self._begin()
@@ -211,26 +210,12 @@ class FaultTwins:
             self._decide_anew()
             return []
         self._recent.append(second)
-        if self._reads is not StrokeReading.ANGLE:
-            self._creep.take(second.stamp, second.block)
-        if leaks := self._leaks(second.stamp):
+        leaks = [] if self._reads is StrokeReading.ANGLE else self._creep.take(second.stamp, second.block)
+        if leaks:
             self._decide_anew()
         for each, twin in zip(self._hypotheses, self._twins, strict=True):
             _feed(twin, each, second)
         return [*leaks, *self._decided(second.stamp)]
-
-    def _leaks(self, stamp: int) -> list[Alarm]:
-        """Return the alarms of creeping cylinders that begin or end."""
-        news, creeping = list[Alarm](), self._creep.creeping
-        for i in [i for i in self._leaking if i not in creeping]:
-            news.append(replace(self._leaking.pop(i), until=stamp))
-        for i, each in creeping.items():
-            if each.is_told and i not in self._leaking:
-                name = f"cylinder_{i + 1}"
-                told = f"by {1e3 * each.rate:+.2g} mm/s, {1e3 * each.change:+.2g} mm up to now"
-                self._leaking[i] = Alarm(name, "creeps", each.onset, None, f"{name}.drive", told)
-                news.append(self._leaking[i])
-        return news
 
     def _decided(self, stamp: int) -> list[Alarm]:
         """Return the alarms of named faults that begin or end with the evidence of a second."""
