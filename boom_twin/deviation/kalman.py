@@ -7,13 +7,13 @@ import math
 from ..kernels.jit import inner
 from .channels import IMU_DRIFT, IMU_SCALE, IMU_TURN, TIP_IMU_STATES
 from .rows import spread_of
-from .states import all_states, drive_place, force_place, zero_place
+from .states import PREDICTION, all_states, drive_place, force_place, zero_place
 
 FAST, SLOW = 0.1, 60.0  # s, time constants of the two parts of the load
 DRIVE_TIME = 0.12  # s, correlation time of a drive's acceleration
 LEAK = 1e-14  # m^2/s, random walk of a drive
 ANGLE_ZERO, ANGLE_DRIFT = 2e-4, 1e-5  # rad; rad in a root second: sensors' zeros, and the error of the model's statics
-FORCE_ZERO, FORCE_DRIFT = 1.0, 0.03  # share of the force; in a root second
+FORCE_ZERO, FORCE_REST, FORCE_TURN = 1.0, 0.003, 0.02  # share of the force; in a root second; in a root radian of all joints
 
 
 @inner
@@ -72,9 +72,13 @@ def make_transition(p, f, h):
         put_weight(f, k, k, 1.0)
     for a in range(2):
         f.variances[zero + a] = f.drift[a] * IMU_DRIFT * IMU_DRIFT * h
+    turned = 0.0
+    for i in range(n):
+        turned += abs(p.slope[i] * f.mean[PREDICTION, drive + n + i]) * h
+    share2 = FORCE_REST * FORCE_REST * h + FORCE_TURN * FORCE_TURN * turned
     for i in range(n):
         f.variances[zero + 4 + i] = f.drift[4 + i] * ANGLE_DRIFT * ANGLE_DRIFT * h
-        f.variances[zero + 4 + n + i] = f.drift[4 + n + i] * (FORCE_DRIFT * f.pulls[i]) ** 2 * h
+        f.variances[zero + 4 + n + i] = f.drift[4 + n + i] * share2 * f.pulls[i] * f.pulls[i]
     further = TIP_IMU_STATES + 2 * n
     for k in range(further, p.behind[0]):
         walk = p.errors[k - further].walk

@@ -45,11 +45,12 @@ def watch_valves(p, f, h, size):
 def learn_jerk(p, f, h):
     """Learn the jerk density of the drives' accelerations: a variance of 2/T (E a^2) is stationary under that density.
 
-    Behind a closed valve it is that of a valve that opens. A smaller one takes the start of a quick move for a load.
+    A closed valve has the density of one that opens: a smaller one would take a quick start for a load. An inclinometer
+    cannot tell a quick start from its own error by acceleration, so its density is learnt there too.
     """
     n = p.drives.shape[0]
     for i in range(n):
-        if f.is_open[i] == 0:
+        if f.is_open[i] == 0 and not (p.reads_angle and p.sways[i]):
             reach2 = p.readings[2 + i, n] ** 2 + p.readings[2 + i, n + 1] ** 2
             f.jerk[i] = min(2.0 / DRIVE_TIME * OPENING * OPENING / max(reach2, 1e-9), MOST_JERK)
             continue

@@ -30,13 +30,14 @@ from ..scene.summary import weight_of
 from ..types import GIVE, NO_PLACES, SENSORS, Array, Clock, Mount, Place, Stream, StrokeReading, channels_of, streams_of
 from .channels import DRIFT_FIRST, LAG_FIRST, READS_MOMENT, TIP_IMU_STATES, measurement_of
 from .estimate_row import MODES
-from .kalman import FORCE_DRIFT, FORCE_ZERO
+from .kalman import FORCE_ZERO
 from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .sensor_model import TURN, mounting_of
 from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
+GAUGE_DRIFT = 0.03  # share of the moment in a root second, by which the zero of a strain gauge drifts
 PASSES, SAME = 20, 1e-10  # passes for the boom at rest by its angle sensors, until they read the same, rad
 WIDTH = 1e-6  # relative accuracy of natural frequencies
 USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 2.5e-3, 1e-4, 2e-3, 2e-2  # shares of the boom's weight, see `SensorNoise`
@@ -247,7 +248,7 @@ class BoomPredictor:
         bent = np.abs(p.bending @ p.rest)
         for row in p.channels[p.channels.kind == READS_MOMENT]:
             error = p.errors[int(row.zero) - TIP_IMU_STATES - 2 * self.plan.joints]
-            error.first, error.walk = FORCE_ZERO * (bent[row.index] + 0.1 * bent.max()), FORCE_DRIFT * bent[row.index]
+            error.first, error.walk = FORCE_ZERO * (bent[row.index] + 0.1 * bent.max()), GAUGE_DRIFT * bent[row.index]
 
     @property
     def angles(self) -> Array:

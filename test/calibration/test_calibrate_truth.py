@@ -113,7 +113,7 @@ def test_oil_gets_another_bulk_modulus(two_sections, tmp_path):
     cylinder = first.cylinder.model_copy(update={"k": None, "oil": oil})
     scene = two_sections.model_copy(update={"joints": (first.model_copy(update={"cylinder": cylinder}), *rest)})
     truth = off(scene, 0.9, 1.1)
-    bag = made(truth, "arch", 30.0, 4, ("pump:0.5:150",)).write(tmp_path / "bag", 1)
+    bag = made(truth, "arch", 40.0, 4, ("pump:0.5:150",)).write(tmp_path / "bag", 1)
     found = calibrate([bag], scene, Choice(zeros="angles"))
     write_scene(found, scene, anew(scene), tmp_path / "new.yaml", "by a test")
     now = load_scene(tmp_path / "new.yaml").joints[0].cylinder
