@@ -139,7 +139,6 @@ class SampleTaker:
         self._former = before  # let go of when the next model is made, which may be in a thread of its own
         self._compiled = BlockUpdate(*parts, self.counts, self.shedding, self._room.samples, before)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, max(self._widths))))
-        self._row = self._one.values[0]
 
     def _take_over(self, stamp: int) -> list[str]:
         """Apply the requested changes; return the events. Another load, or other zeros of strokes, need a start from rest."""
@@ -180,7 +179,7 @@ class SampleTaker:
 
     def _advance_one(self, sample: Sample, trusted: bool = False) -> int:
         one = self._one
-        one.streams[0], one.stamps[0], self._row[: len(sample.values)] = CODES[sample.stream], sample.stamp, sample.values
+        one.streams[0], one.stamps[0], one.values[0, : len(sample.values)] = CODES[sample.stream], sample.stamp, sample.values
         reason, _ = self._compiled.advance(self._run, one, trusted)
         return reason
 
