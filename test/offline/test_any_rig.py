@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from any_rig import DRIFT, KNOWN, LAG, TURNED, motion, write
+from offline.any_rig import DRIFT, KNOWN, LAG, TURNED, motion, write
 
 from boom_twin import replay
 from boom_twin.cli.main import main
