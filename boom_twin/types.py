@@ -162,6 +162,7 @@ SENSORS[Stream.PRESSURES] = SensorKind(
     gives=Stream.FORCES.value,
 )
 """In the order of `Stream`. Expected readings are in `boom_twin.deviation.channels`, topics in ``topics.yaml``."""
+NO_LAG = frozenset({Stream.FORCES, Stream.PRESSURES, Stream.MOMENTS})  # zeros that change with the posture hide a lag
 
 
 USUAL_STREAMS = tuple(stream for stream, kind in SENSORS.items() if not (kind.is_placed or kind.beside or kind.gives))

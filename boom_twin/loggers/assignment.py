@@ -45,8 +45,8 @@ class Assignment:
         """Return the header of a column with its file."""
         return f"{self.tables[use.table].headers[use.place]!r} of {self.tables[use.table].source}"
 
-    def check(self, joints: int | None) -> None:
-        """Raise BagError for a column without unit, a cylinder without column, and a file without times or channels."""
+    def check(self, joints: int | None, drive: Stream) -> None:
+        """Raise BagError for a column without unit, a file without times or channels, and a missing column of `drive`."""
         problems, found = list(self.problems), {use.channel for use in self.used}
         for number in sorted({use.table for use in self.used}):
             table, times = self.tables[number], self.times[number]
@@ -66,12 +66,13 @@ class Assignment:
                 f"{self.header(use)}: {use.reason}" for use in self.unused if self.tables[use.table].source == source
             )
             problems.append(f"{source}: no column of a channel ({told}). Leave it out, or give --column CHANNEL=NAME:UNIT.")
-        strokes = channels_of(joints or self.joints)[Stream.STROKES]
-        if (missing := [channel for channel in strokes if channel not in found]) and self.used:
+        driving = channels_of(joints or self.joints)[drive]
+        if (missing := [channel for channel in driving if channel not in found]) and self.used:
             free = "; ".join(f"{self.header(use)} ({use.reason})" for use in self.unused) or "none"
+            needs = "the length of every cylinder; a mapping with `drive: angles` needs all angles instead"
             problems.append(
-                f"no column for {', '.join(missing)}. Not used: {free}. Give --column {missing[0]}=NAME:UNIT or "
-                "--columns FILE; the twin needs the length of every cylinder."
+                f"no column for {', '.join(missing)}. Not used: {free}. Give --column {missing[0]}=NAME:UNIT or --columns "
+                f"FILE; the twin needs {needs if drive is Stream.STROKES else 'the angle of every joint, by `drive: angles`'}."
             )
         if problems:
             raise BagError("\n  ".join([f"{len(problems)} fault{'s' * (len(problems) > 1)} in the columns:", *problems]))

@@ -106,12 +106,14 @@ def import_session(
         The mapping or the time zone cannot be used.
     """
     assignment = assign(tables, given, joints)
-    assignment.check(joints)
+    by_angles = load_mapping(mapping, joints or assignment.joints).drive == "angles"
+    drive = Stream.ANGLES if by_angles else Stream.STROKES
+    assignment.check(joints, drive)
     joints = joints or assignment.joints
     text, topics = _mapping(mapping, assignment, joints)
     zone = zone_of(given.timezone) if given.timezone else None
     read = _read(assignment, given, zone)
-    _check_spans(assignment, read)
+    _check_spans(assignment, read, drive)
     shift = max(0, SECOND - min(each.span[0] for each in read.values()))
     readings = [
         found
@@ -152,8 +154,8 @@ def _read(assignment: Assignment, given: ColumnFile, zone: tzinfo | None) -> dic
     return found
 
 
-def _check_spans(assignment: Assignment, read: dict[int, ReadTable]) -> None:
-    """Raise BagError if columns of a channel overlap in time, or a table has no time in common with the strokes."""
+def _check_spans(assignment: Assignment, read: dict[int, ReadTable], drive: Stream) -> None:
+    """Raise BagError if columns of a channel overlap in time, or a table has no time in common with `drive`."""
     spans = {number: each.span for number, each in read.items()}
     told = {number: f"{assignment.tables[number].source}: {each.span_text}" for number, each in read.items()}
     if len({each.times.is_absolute for each in read.values()}) > 1:
@@ -169,11 +171,12 @@ def _check_spans(assignment: Assignment, read: dict[int, ReadTable]) -> None:
                     f"{channel}: {told[first]} and {told[second]} overlap. Leave one out, or give column and file of "
                     f"{channel} in --columns FILE."
                 )
-    strokes = {use.table for use in assignment.used if stream_of(use.channel) is Stream.STROKES}
+    word = "strokes" if drive is Stream.STROKES else "angles that drive the model"
+    driving = {use.table for use in assignment.used if stream_of(use.channel) is drive}
     for number, (start, end) in spans.items():
-        if not any(start <= spans[other][1] and spans[other][0] <= end for other in strokes):
+        if not any(start <= spans[other][1] and spans[other][0] <= end for other in driving):
             raise BagError(
-                f"{told[number]}: no time in common with the strokes ({'; '.join(told[other] for other in strokes)}). "
+                f"{told[number]}: no time in common with the {word} ({'; '.join(told[other] for other in driving)}). "
                 "Check dates and time zones."
             )
 

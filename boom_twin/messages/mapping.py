@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import SENSORS, Stream, sensor_kind, stream_of
+from ..types import NO_LAG, SENSORS, Stream, sensor_kind, stream_of
 from .topic_table import (
     TYPES,
     InputTopic,
@@ -237,6 +237,9 @@ def _input_faults(topics: Topics) -> Iterator[Fault]:
         if topic.place is None and SENSORS[stream].is_placed and not SENSORS[stream].is_named:
             told = "it must be there: section, at (m), turned (rad)"
             yield Fault(f"inputs.{stream.value}.place", None, told, "Give {} for the tip.")
+        if isnan(topic.delay) and stream in NO_LAG:
+            told = "auto is not for forces, pressures and moments: their zeros change with the posture, which hides a lag"
+            yield Fault(f"inputs.{stream.value}.delay", "auto", told, "Give the seconds, or leave the key out.")
         if topic.reads is not None and stream is not Stream.STROKES:
             yield Fault(f"inputs.{stream.value}.reads", topic.reads, "only cylinder_strokes has it", "Remove the key.")
     drive, named = (Stream.ANGLES, "an angle") if topics.drive == "angles" else (Stream.STROKES, "a stroke")

@@ -24,7 +24,7 @@ from ..scene.load import SceneSource
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..twin.twin import Twin
-from ..types import SENSORS, Array, Change, Place, Stream, StrokeReading
+from ..types import NO_LAG, SENSORS, Array, Change, Place, Stream, StrokeReading
 from ..wiring.check import Checked, Verdict, check
 from ..wiring.expected import RestModel
 from ..wiring.lag import Lag, lag_of
@@ -38,6 +38,8 @@ MOST_LAG = 0.08  # s, below which the filter finds a lag; it knows how far the e
 SIGMAS = 4.0  # standard deviations by which a lag, or a reading as drive or length, has to be told
 ZERO = math.radians(0.15)  # zeros of encoders
 AXES = "x", "y", "z"
+
+UNTIMED = {Stream.STROKES, *NO_LAG}
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,8 @@ def commission(
     joints = len(own.scene.joints)
     mapped, document = mapping_of(session.path, given, joints), _document(session.path, given)
     reads = strokes_of(session.path, mapped).reading
+    if reads is StrokeReading.ANGLE:
+        raise BagError(f"{session.path}: has `drive: angles`. The check needs the strokes of all cylinders; it cannot be made.")
     settings = settings_of(session.path).settings
     series = readings_of(session, mapped.topics, joints, window)
     places = mapped.topics.places
@@ -241,7 +245,10 @@ def _values(message: Any, stream: Stream) -> list[tuple[str, float]]:
 
 
 def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, found: Checked) -> dict[Stream, Lag]:
-    """Return the lags of the streams against what the strokes make a twin expect."""
+    """Return the lags of angles, IMUs and points against what the strokes make a twin expect.
+
+    Forces have none: their zeros change with the posture, which hides a lag.
+    """
     raw: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
     left: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
     for step in drive_blocks(twin, _samples(session, topics, window, len(twin.mounts))):
@@ -251,7 +258,7 @@ def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, foun
                 if isinstance(each, ReportBlock):
                     _collect(left, each.residuals)
     known = {v.stream for v in found.verdicts} - {v.stream for v in found.verdicts if v.is_wrong and not v.is_sure}
-    return {each: _lag(raw[each], left[each]) for each in Stream if each in known and each is not Stream.STROKES and left[each]}
+    return {each: _lag(raw[each], left[each]) for each in Stream if each in known - UNTIMED and left[each]}
 
 
 def _samples(session: Session, topics: Topics, window: TimeWindow, joints: int) -> Iterator[Any]:

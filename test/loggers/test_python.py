@@ -151,3 +151,13 @@ def test_tables_that_cannot_be_read_are_refused(fault: str, rows: Rows, tmp_path
     with pytest.raises(BoomTwinError) as error:
         replay(change(columns_of(rows)), None, tmp_path / "out")
     assert words in str(error.value) and not (tmp_path / "out").exists()
+
+
+def test_a_rig_with_encoders_alone_replays_from_a_table(rows: Rows, tmp_path: Path) -> None:
+    mapping = tmp_path / "rig.yaml"
+    mapping.write_text("drive: angles\n")
+    columns = {name: column for name, column in columns_of(rows).items() if not name.startswith("cylinder")}
+    found = replay(columns, load_scene(), tmp_path / "out", mapping=mapping, with_bag=False)
+    assert found.summary["strokes"] == "angle" and found.summary["samples"] > 0
+    with pytest.raises(BagError, match="a mapping with `drive: angles` needs all angles instead"):
+        replay(columns, load_scene(), tmp_path / "other", with_bag=False)

@@ -245,8 +245,10 @@ def test_messages_of_another_frame_are_left_out_and_counted(frame_id: str, taken
 
 
 def test_a_delay_may_be_unknown_but_for_what_drives_the_model() -> None:
-    topics = mapping_from({"inputs": {"joint_angles": {"delay": "auto"}, "cylinder_pressures": {"delay": "auto"}}}, "mapping")
-    assert topics.lagging == [Stream.ANGLES, Stream.FORCES] and topics.delay(Stream.ANGLES) == 0
+    topics = mapping_from({"inputs": {"joint_angles": {"delay": "auto"}, "tip_imu": {"delay": "auto"}}}, "mapping")
+    assert topics.lagging == [Stream.ANGLES, Stream.IMU] and topics.delay(Stream.ANGLES) == 0
+    with pytest.raises(UsageError, match="auto is not for forces"):
+        mapping_from({"inputs": {"cylinder_pressures": {"delay": "auto"}}}, "mapping")
     for delay, told in (("auto", "Give the others auto"), ("often", "seconds .* or auto")):
         with pytest.raises(UsageError, match=told):
             mapping_from({"inputs": {"cylinder_strokes": {"delay": delay}}}, "mapping")
