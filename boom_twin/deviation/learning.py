@@ -1,4 +1,4 @@
-"""Learn which valves are open, and the sizes of jerk, load and noise of lengths."""
+"""Learn which valves are open, the jerk density, the variance of the load, and the noise of lengths."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from .kalman import DRIVE_TIME
 from .mixture import copy_model
 from .states import ALL_OPEN, ALL_VALVES, BURST, ESTIMATE, FED, OPEN, PREDICTION, VALVES, all_states, drive_place, force_place
 
-LEARN_LOAD = 3.0  # s, in which the size of the fast load is learnt
-SURPRISE = 9.0  # times its variance: most that one sample counts for in that
+LEARN_LOAD = 3.0  # s, in which the variance of the fast load is learnt
+SURPRISE = 9.0  # largest square of a value that counts in the learnt variance, in terms of the present variance
 LEAST_JERK, MOST_JERK = 1e-3, 10.0  # m^2/s^5
 OPENING = 0.5  # m/s^2, by which a valve that opens may accelerate the tip: standard deviation
 JERK_RISE, JERK_FALL = 0.05, 0.5  # s, in which that density is learnt
-OPENED, SHUT = 4.0, 3.0  # standard deviations of a drive's rate: beyond the one it moves, below the other it may stand still
-SHUT_TIME = 0.15  # s below the second before its valve is believed closed
+OPENED, SHUT = 4.0, 3.0  # standard deviations of a drive's rate: above OPENED it moves, below SHUT it may stand still
+SHUT_TIME = 0.15  # s below SHUT after which a valve is believed closed
 LEARN_LENGTH = 0.02  # share of a third difference that counts for the noise of a length
-UNEVEN = 0.5  # share of the time between two lengths by which the one before may differ, for differences of them
+UNEVEN = 0.5  # largest relative change of the sampling interval within a third difference
 
 
 @inner
@@ -43,7 +43,7 @@ def watch_valves(p, f, h, size):
 
 @inner
 def learn_jerk(p, f, h):
-    """Learn the jerk density of the drives' accelerations: a variance of 2/T (E a^2) is stationary under that density.
+    """Learn the jerk density of the drives: 2/T times the mean square of the acceleration, a Gauss-Markov process.
 
     A closed valve has the density of one that opens: a smaller one would take a quick start for a load. An inclinometer
     cannot tell a quick start from its own error by acceleration, so its density is learnt there too.
@@ -91,6 +91,6 @@ def learn_load(p, f, h):
 
 @inner
 def learnt(f, before, shown, h):
-    """Return a variance (N^2) brought towards what is shown."""
+    """Return a variance (N^2) after a step of its first-order filter towards what is shown."""
     found = before + min(h / LEARN_LOAD, 1.0) * (min(shown, SURPRISE * before) - before)
     return max(found, f.noise.least_load * f.noise.least_load)

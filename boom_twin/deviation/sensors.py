@@ -12,13 +12,13 @@ from .mixture import mix, weigh_models
 from .rows import SWAY_SHARE, clear, read, variance_of
 from .states import ALL_OPEN, ALL_VALVES, ESTIMATE, FED, FED_STAMP, PREDICTION, all_states, drive_place, zero_place
 
-INEXACT = 0.03  # share of the tip's acceleration that modes left out and those there are wrong by
-LEARN_NOISE = 0.02  # of a reading, by which the noise of its channel is learnt
-LEARN_RATIO = 0.005  # of a reading, by which the size of its channel's normalised innovations is learnt
-DOF = 4.0  # degrees of freedom of Student's t, by which innovations of the estimate are weighed
+INEXACT = 0.03  # error of the model's accelerations and rates of turn: share of their root mean square at the site
+LEARN_NOISE = 0.02  # weight of one reading in the learnt noise of its channel
+LEARN_RATIO = 0.005  # weight of one reading in the mean square of its channel's normalised innovations
+DOF = 4.0  # degrees of freedom of Student's t, the distribution of innovations of the estimate
 SLOW = 5_000_000_000  # ns for which the position of a point keeps the estimate, beyond other readings
 OLDEST = 0.1  # s, most that a reading may be late
-CLEAR_RATE = 3.0  # standard deviations from zero of a rate that tells of a lag
+CLEAR_RATE = 3.0  # standard deviations by which a reading's rate must differ from zero to tell of a lag
 
 
 @kernel
@@ -28,13 +28,13 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
     Parameters
     ----------
     stream : int
-        By `boom_twin.twin.blocks.CODES`; the estimate leaves out one that no channel has.
+        By `boom_twin.twin.blocks.CODES`; a stream without channels is left out.
     first : int
         First of its channels among the measured ones.
     residuals : ndarray, shape (k,)
         Those of its channels first; NaN where missing.
     stamp, newest : int
-        Of the sample, and of the newest lengths, ns.
+        Stamps of the sample, and of the newest lengths, ns.
     """
     age = (newest - stamp) * 1e-9
     last, usable, lag = first, False, p.channels[first].lag
@@ -73,7 +73,7 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
 
 @inner
 def admit_errors(p, f, count):
-    """Let the estimate have at least `count` states behind those of the prediction; new ones are unknown."""
+    """Append states of sensor errors to the estimate until there are `count`, each with its first variance."""
     zero = zero_place(p)
     while p.behind[0] < count:
         at, p.behind[0] = zero + p.behind[0], p.behind[0] + 1
@@ -86,9 +86,9 @@ def admit_errors(p, f, count):
 
 @inner
 def add_lag(p, f, lag, row):
-    """Add the column of a stream's lag to a row: minus the rate of the reading. Return the variance of what it leaves out.
+    """Add the column of a stream's lag to a row, minus the rate of the reading; return the variance by an uncertain rate.
 
-    A rate that may be zero tells nothing of the lag; the lag is then noise.
+    A rate that may be zero tells nothing of the lag. The lag is then noise.
     """
     size, at, rates, h = zero_place(p), zero_place(p) + lag, f.rows[2], f.interval[1]
     if h == 0.0:
@@ -109,7 +109,7 @@ def add_lag(p, f, lag, row):
 
 @inner
 def correct_stamps(p, f, lag):
-    """Move the estimate of a lag to the stamps of its streams, so that rows are linear about it."""
+    """Add the estimated lag to the lags of its streams, and set its state to zero: rows are linear about the estimate."""
     at = zero_place(p) + lag
     change = f.mean[ESTIMATE, at]
     for k in range(ALL_VALVES, ALL_OPEN + 1):
@@ -124,7 +124,7 @@ def correct_stamps(p, f, lag):
 def replace_length(p, f, c, residual):
     """Correct the prediction by the residual of the angle sensor `c`, because the stroke transducer of its cylinder fails.
 
-    The mean stays that of the prediction which the residual was taken against, until the next step.
+    The mean of the mixture follows in the next step: further residuals of the sample are against the old one.
     """
     size = zero_place(p)
     measurement_row(p, f, c, f.row)
@@ -139,8 +139,8 @@ def replace_length(p, f, c, residual):
 def take_reading(p, f, channel, residual, variance, age):
     """Correct the estimate by a residual of the quantity in `f.row`, `age` s old, of a measured channel.
 
-    Its noise is learnt: innovations that are larger than expected raise it until they are as expected. The evidence takes
-    innovations by the size that they have lately had, for a model is not better for expecting less of the same innovations.
+    Its noise is learnt: innovations that are larger than expected raise it until they are as expected. The evidence
+    scales innovations by their recent mean square: a model gains nothing by stating a smaller variance.
     """
     size, every, m = zero_place(p), all_states(p), p.modes[0]
     n, drive = p.drives.shape[0], drive_place(p)

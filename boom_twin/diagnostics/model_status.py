@@ -21,11 +21,9 @@ from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
 from .levels import Bounds, ComponentJudge, Level, Status, Value
 
 FAILURE_SHOWN = 1.0  # time (s) for which a failure is shown
-LOAD_WINDOW, SWING_WINDOW = (
-    40 * SECOND,
-    4 * SECOND,
-)  # ns, of loads at the tip; of its displacements, four periods of a slow boom
-INTERVAL = SECOND // 50  # ns between two of them
+LOAD_WINDOW = 40 * SECOND  # ns, window of loads at the tip
+SWING_WINDOW = 4 * SECOND  # ns, window of displacements of the tip: four periods of a slow boom
+INTERVAL = SECOND // 50  # ns, least time between two values of a window
 MEGA = 1e6
 Item = TypeVar("Item")
 
@@ -39,7 +37,7 @@ class ModelWatch:
     def __init__(self, now: float, drive: str = "strokes") -> None:
         self._drive = drive
         self._predictions = self._failures = self._broken = 0
-        self._predicted_at = self._unfed_at = now  # newest look with a prediction, and without strokes
+        self._predicted_at = self._unfed_at = now  # times of the newest status with a prediction, and of that without strokes
         self._counts: Mapping[str, Value] = {}  # at `_predicted_at`
         self._is_deflected = False
         self._failure, self._failed_at, self.has_news = "", -FAILURE_SHOWN, False

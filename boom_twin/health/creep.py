@@ -1,6 +1,6 @@
 """Monitor of cylinders that creep: their lengths change slowly and evenly, as an operator hardly moves them.
 
-A leak makes a cylinder creep. The joint's angle sensor turns with it; if it does not, the stroke transducer drifts.
+A leak makes a cylinder creep, and its joint turns. If the angle sensor shows no turn, the stroke transducer drifts.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Stream
 from .blocks import means_of
 
-SPAN, PARTS = 12, 4  # s in which lengths change evenly, several strokes of a pump; parts of it whose means are compared
+SPAN, PARTS = 12, 4  # s of a window, several periods of a pump; equal parts of it whose means are compared
 UNEVEN = 0.4  # largest relative difference of the rates between parts, and of the rates by length and by angle
-SWING = 1e-3  # m, by which pump and wind change the mean length from second to second; several short moves change it by more
-SLOWEST, FASTEST = 1e-4, 3e-3  # m/s, rates of creeping: above noise, and below what valves are opened for
-CREPT = 4e-3  # m, least change of length for an alarm: more than the oil of a spring that softens gives way
+SWING = 1e-3  # m, largest change of a mean length from second to second by pump and wind; short moves change it by more
+SLOWEST, FASTEST = 1e-4, 3e-3  # m/s, rates of creeping: above noise, and below the moves of an operator
+CREPT = 4e-3  # m, least change of length for an alarm: a softening oil spring changes it by less
 
 
 class Creep(NamedTuple):

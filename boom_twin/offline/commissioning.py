@@ -34,9 +34,9 @@ from .session_samples import SessionSamples
 
 LOOK = 60.0  # s of a session that `wiring_of` reads
 LATE = 0.01  # s, smallest lag that is proposed as `delay`
-MOST_LAG = 0.08  # s, below which the filter finds a lag; it knows how far the expected readings lag themselves
-SIGMAS = 4.0  # standard deviations by which a lag, or a reading as drive or length, has to be told
-ZERO = math.radians(0.15)  # zeros of encoders
+MOST_LAG = 0.08  # s, largest lag that the filter is left to estimate
+SIGMAS = 4.0  # standard deviations required to accept a lag, or to tell drives from lengths
+ZERO = math.radians(0.15)  # standard deviation of an encoder's zero
 AXES = "x", "y", "z"
 
 UNTIMED = {Stream.STROKES, *NO_LAG}
@@ -150,7 +150,7 @@ def commission(
         twin = Twin(own.scene, *sensing, places=topics.places, lagging=topics.lagging)
         lags = _lags(twin, session, topics, window, found)
         near = [stream for stream, lag in lags.items() if abs(lag.lag) < MOST_LAG and lag.sigma < math.inf]
-        for _ in range(2):  # the second time those that are not late tell the time
+        for _ in range(2):  # the second pass estimates lags of late streams only; the others give the time
             twin = Twin(own.scene, *sensing, places=topics.places, lagging=dict.fromkeys([*topics.lagging, *near]))
             for _step in drive_blocks(twin, _samples(session, topics, window, joints)):
                 pass

@@ -10,10 +10,10 @@ from .regular import reach_of_strokes
 from .state import CHECKED, EPOCH, IN_SLOT, NEWEST, OTHERS, TRUSTED, Limits, TwinState
 from .update import matched
 
-MOST_DOUBTED = 5  # implausible readings in a row, without a jump, that are left out; the next one is accepted
+MOST_DOUBTED = 5  # largest number of implausible readings in a row, without a jump, that are left out
 SILENT_AFTER = 100_000_000  # ns after which a missing stroke is reported
-BELIEVED_AFTER = 1_000_000_000  # ns after which readings that stay where they jumped are accepted
-USUAL_RATE = 0.1  # share of the maximum rate; with twice the estimated rate it bounds the motion between jump and return
+BELIEVED_AFTER = 1_000_000_000  # ns after which the model restarts where a reading jumped and stayed
+USUAL_RATE = 0.1  # motion during a jump: at most this share of the maximum rate, plus twice the estimated rate
 NEVER = -1
 Flags = NDArray[np.bool_]
 
@@ -95,7 +95,7 @@ class StrokeCheck:
     def of(
         self, stamp: int, values: Array, before: Array, estimate: Array | None, rates: Array, limits: Limits
     ) -> tuple[Array, list[str]]:
-        """Return the strokes (n,) for the model, NaN = missing, and events. See `must_restart` next.
+        """Return the strokes (n,) for the model, NaN = missing, and events. The caller then checks `must_restart`.
 
         `values` and those `before` are measured, m; `estimate` is None for the first sample of a run; `rates` (m/s) are
         estimated at the sample before. `stamp` is in ns.
@@ -134,7 +134,7 @@ class StrokeCheck:
         return np.asarray(rates * elapsed)
 
     def _note_jumps(self, stamp: int, far: Flags, jumps: Flags, is_onward: Flags, returned: Flags) -> Flags:
-        """Note strokes that jumped; return those that jumped back. A second jump onward is motion, seen by a slow sensor."""
+        """Note strokes that jumped; return those that jumped back. A second jump onward is motion, sampled slowly."""
         is_away = self._jumped != NEVER
         is_back: Flags = is_away & returned
         is_over = is_back | ~far | (is_away & jumps & is_onward)

@@ -20,24 +20,24 @@ from .regular import SHORTEST_STEP, USUAL_STEP, is_next, longest_step, note_stam
 from .run import Run
 from .state import NONE, Limits, TwinState
 
-EARLY_STEP = 8.0  # usual intervals; where strokes are as expected after a step up to that, it need not be confirmed
+EARLY_STEP = 8.0  # usual intervals, longest step ahead that is accepted at once if the strokes are as expected
 MOST_HELD = 1024  # samples that wait
-SECOND_LINE = 1_000_000_000  # ns that a second line of stamps has to go on alone before it is followed
-SURPRISE = 0.1  # of the fastest cylinder's way in a usual interval, by which strokes that go on may surprise
+SECOND_LINE = 1_000_000_000  # ns after a stray stamp in which a step in time must be confirmed for the setting `gap`
+SURPRISE = 0.1  # tolerance of strokes that go on: share of the fastest cylinder's travel in a usual interval
 MOVING = 3.0  # deviations by which a cylinder must be moving, to tell a pause from a clock that was set
 CLEARER = 10.0  # how much better strokes must fit where the usual interval would have put them, than after a pause
 LASTING_SPEED = 1.0  # s for which a speed is taken to last
 
 
 class StampCheck:
-    """Line of stamps that is followed, and another line that may replace it.
+    """Line of stamps that is followed, and another line that may replace it. A line is the sequence of stamps of one source.
 
     A sample whose stamp steps ahead or back is held and has no effect. If the next samples continue the old line, it was
     stray. If they follow the held sample, time has stepped: it and they are released together. After a stray stamp within the
     last second there may be two sources. Then the other line must continue alone for longer.
 
-    `held` has the newest samples of the other line, each with the event reported for it. `is_second` if that line had been
-    met before and the followed one went on since: there are two sources.
+    `held` has the newest samples of the other line, each with the event reported for it. `is_second` is True if they continue
+    a line that was seen before, while the followed one went on: there are two sources.
     """
 
     def __init__(self, settings: Settings, state: TwinState, stream: int) -> None:
@@ -95,7 +95,7 @@ class StampCheck:
             self._note_held()
 
     def hold(self, sample: Sample, event: str, is_apart: bool = False) -> str:
-        """Hold a sample, after the held ones that it follows or else in their place; return its event.
+        """Append a sample to the held ones if it follows them, else replace them by it; return its event.
 
         A sample that `is_apart` does not follow the held ones: no cylinder could have moved from their values to its own.
         """
@@ -110,14 +110,14 @@ class StampCheck:
         return event
 
     def is_confirmed(self, least: float = 0.0) -> bool:
-        """Return True if the held samples continue for `least` ns, and until the line that is followed is late."""
+        """Return True if the held samples span `least` ns (after a recent stray stamp: `gap`), and about a usual interval."""
         if self._strayed is not None and self.newest is not None and self.newest - self._strayed < SECOND_LINE:
             least = max(least, self._gap)
         span = self.held[-1][0].stamp - self._since
         return span > 0 and span >= max(self.usual / USUAL_STEP, least)
 
     def release(self, counts: Counter[str]) -> list[Sample]:
-        """Return the held samples; their line is followed from now on. Uncount the events of all but the newest."""
+        """Return the held samples; their line is followed from now on. Their events, but the newest, are uncounted."""
         held, self.held, self._other = self.held, [], self.newest
         self._note_held()
         self._state.usual[self._stream] = self.usual or float(held[-1][0].stamp - held[0][0].stamp) / (len(held) - 1)
@@ -176,9 +176,9 @@ def _explain(
 ) -> TimeStep:
     """Return the reason for a step of the stamps by `span` (s).
 
-    A clock was set if both samples are where they would have been after the usual interval. If the stamps went ahead by no
-    more than can be bridged, that is also what a pause at rest looks like: then a cylinder has to move, which would have gone
-    on; else it may be either. `before` are the strokes (n,) before the step, `strokes` those of the first sample after it and
+    A clock was set if both samples are where they would have been after the usual interval. A short pause at rest looks the
+    same. So after a short step ahead, a cylinder must also be moving that would have gone further in a pause; else the reason
+    may be either. `before` are the strokes (n,) before the step, `strokes` those of the first sample after it and
     of one `apart` s later; `usual` is the usual time between samples, s.
     """
     first, later = strokes

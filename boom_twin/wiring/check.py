@@ -1,6 +1,6 @@
 """Commissioning check of a window of readings: channels that are not wired as declared, and their corrected declaration.
 
-An explanation is a way to read every stroke. Its strokes give the boom at rest, and so the expected readings of all other
+An explanation gives each stroke a name, unit, sign and zero. It tells the boom at rest, and the readings of all other
 sensors. The explanation with the least cost wins. A channel is determined if every explanation and hypothesis that reads it
 in another way costs `SURE` nats more.
 """
@@ -37,12 +37,12 @@ from .hypotheses import (
 )
 from .readings import Channel, Table, Window, tables_of
 
-SURE = 7.0  # nats, least margin that determines a channel
+SURE = 7.0  # nats to the next hypothesis, least margin that determines a channel
 WRONG = 4.0  # nats per block (2.8 standard deviations) above which a channel is not as declared
 DOUBTFUL = 1.0  # nats per block above which other ways are compared, as an error may show in few postures
 KEPT = 8  # stroke explanations compared with all sensors
 MOVED = 0.03  # least change of a stroke that is a move, relative to the largest stroke
-STILL_WEIGHT, MOVED_WEIGHT = 1.0, 4.0  # independent postures: at rest, after a move
+STILL_WEIGHT, MOVED_WEIGHT = 1.0, 4.0  # effective number of independent postures: boom at rest; boom moved
 Declared = Mapping[Stream, Sequence[Channel]]
 
 

@@ -31,12 +31,12 @@ from .scanner import DamagedBytes, SoundRecords, scan_damaged
 class FileDefinitions:
     """Definitions, notes and counts of one damaged file."""
 
-    # channels, schemas: by number; a definition under a checksum replaces one without
+    # channels, schemas: by number; one with a valid checksum replaces one without
     channels: dict[int, Channel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
     told: Counter[str] | None = None  # number of messages by topic from a sound summary
-    is_summed: bool = False  # True if the checksum of all bytes up to the end of the data fits
+    is_summed: bool = False  # True if the checksum of the data section is valid
 
     def topic(self, channel: int, metadata: BagMetadata | None) -> Recorded | None:
         """Return the topic of a channel; None if its definition is lost."""
@@ -115,7 +115,7 @@ class Recovery:
 
     # number of messages by topic, counted in the new session after it was written
     saved: Counter[str] = field(default_factory=Counter)
-    unvouched: Counter[str] = field(default_factory=Counter)  # number of saved messages by topic that were under no checksum
+    unvouched: Counter[str] = field(default_factory=Counter)  # number of saved messages by topic without a checksum
     lost: dict[str, int] | None = None  # number of lost messages by topic; None if the source has no sound count
     nameless: int = 0  # number of sound messages left out because the definition of their topic is lost
     faults: list[tuple[Path, DamagedBytes]] = field(default_factory=list)  # the first `MOST_FAULTS` faults
