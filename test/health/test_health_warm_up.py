@@ -11,7 +11,7 @@ from drive_twin import PUMP_DRIVES
 
 PUMP = Path(__file__).parents[2] / "bags" / "pump_session"
 
-ONCE = [1] * 6  # each kernel is compiled for one set of types
+ONCE = [1] * 5
 CODE = """
 import sys
 from pathlib import Path
@@ -22,14 +22,14 @@ from boom_twin.health.sensor_survey import summarise, survey
 from boom_twin.offline.session_samples import SessionSamples
 from boom_twin.twin.blocks import ReportBlock, SampleBlock
 from boom_twin.twin.twin import Twin
-from boom_twin.twin.update import measure, update, write_residual
+from boom_twin.twin.update import update, write_residual
 
 path = Path(sys.argv[1])
 scene, mapped = scene_of(path, None).scene, mapping_of(path, None, 4, "")
 topics = mapped.topics
 twin = Twin(scene, health=True, reads=strokes_of(path, mapped).reading)
 twin.warm_up()
-kernels = update, measure, write_residual, survey, summarise, find
+kernels = update, write_residual, survey, summarise, find
 ready = [len(kernel.dispatcher.signatures) for kernel in kernels]
 session = scan(path)
 wanted = [name for name in topics.heard if (found := session.find(name)) is not None and found.count]

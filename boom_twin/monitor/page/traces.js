@@ -70,7 +70,8 @@ export class Traces {
     if (!Number.isFinite(to)) return;
     const further = this.connection.residualTables.filter(({ name }) => !this.kinds.some(kind => kind.table === name));
     if (further.length) this.add(further.map(({ name, residuals }) => residualChart(`residuals-${name}`, name, residuals.title)));
-    if (this.hasEstimate !== Boolean(this.estimate?.count)) { this.hasEstimate = !this.hasEstimate; this.rebuild(); }
+    const hasEstimate = Boolean(this.estimate?.count);
+    if (this.hasEstimate !== hasEstimate) { this.hasEstimate = hasEstimate; this.rebuild(); }
     const filled = this.kinds.filter(kind => this.connection.table(kind.table)?.count);
     if (filled.at(-1) !== this.lowest) { this.lowest = filled.at(-1); this.rebuild(); } // it has the axis of time
     for (const kind of filled) {
