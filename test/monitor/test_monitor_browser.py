@@ -230,7 +230,19 @@ def test_the_page_speaks_the_language_of_its_viewer(
     page.context.close()
 
 
+SETTLED = """async () => {
+  for (let same = 0, width = 0; same < 60;) {
+    await new Promise(requestAnimationFrame);
+    const now = document.querySelector('#chart-acceleration .u-over').clientWidth;
+    same = now === width ? same + 1 : 0;
+    width = now;
+  }
+}"""
+"""Ends when the layout has had its width for 60 pictures."""
+
+
 def test_time_is_chosen_by_dragging_by_span_by_marks_and_by_playing(page: Any) -> None:
+    page.evaluate(SETTLED)
     box = page.locator("#chart-acceleration .u-over").bounding_box()
     page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 20)
     page.mouse.down()
