@@ -14,7 +14,6 @@ from boom_twin.compiler.compile import compile_scene
 from boom_twin.plots.boom import draw_base, draw_cylinder, draw_link, draw_pin, draw_section, named_pins, section_parts
 from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture, side_view
 from boom_twin.scene.kinematics import Skeleton, joint_angles_of_strokes, skeleton
-from boom_twin.scene.schema import section_depth
 from boom_twin.types import Array
 
 EXAGGERATION = 10.0
@@ -25,7 +24,7 @@ def draw_boom(axes: Any, scene: Scene, bones: Skeleton, alpha: float = 0.55) -> 
     """Draw base, sections, cylinders, links and pins of an undeformed boom."""
     size = 0.035 * float(sum(section.length for section in scene.sections))
     for i in range(len(scene.sections)):
-        draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i), alpha)
+        draw_section(axes, section_parts(scene, bones, i), scene.sections[i].depth, alpha)
     for joint, part in zip(bones.joints, scene.joints, strict=True):
         draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, part.cylinder.closed_length, 0.22 * size)
         for corners, colour in zip(joint.links, (GREEN, PURPLE), strict=False):
@@ -66,7 +65,7 @@ def _deflected(axes: Any, straight: Array, equilibrium: Equilibrium) -> None:
 def _lengths(axes: Any, scene: Scene, bones: Skeleton) -> None:
     """Draw number and length of every section, beside its middle."""
     for i, section in enumerate(scene.sections):
-        lift = section_depth(scene, i) + 0.012 * float(np.ptp(bones.pivots, axis=0).max())
+        lift = scene.sections[i].depth + 0.012 * float(np.ptp(bones.pivots, axis=0).max())
         where = bones.point(i, 0.5 * section.length, lift)
         degrees = float(np.degrees(bones.headings[i]))
         axes.text(
@@ -82,7 +81,7 @@ def _detail(axes: Any, scene: Scene, bones: Skeleton) -> None:
     draw_boom(axes, scene, bones)
     pins = list(named_pins(joint).values())
     low, high = np.min(pins, axis=0), np.max(pins, axis=0)
-    middle, reach = 0.5 * (low + high), 0.58 * float(max(high - low)) + section_depth(scene, i)
+    middle, reach = 0.5 * (low + high), 0.58 * float(max(high - low)) + scene.sections[i].depth
     axes.set(xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + 0.8 * np.array([-reach, reach]))
     axes.set(aspect="equal", xticks=[], yticks=[])
     axes.spines[:].set_visible(True)

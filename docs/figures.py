@@ -28,7 +28,7 @@ from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, pictur
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.kinematics import JointPins, Skeleton, skeleton, stroke_curve
 from boom_twin.scene.load import examine_text, example_text
-from boom_twin.scene.schema import Joint, section_depth
+from boom_twin.scene.schema import Joint
 
 SURROGATE = "drawn from the default scene (surrogate parameters)"
 
@@ -71,7 +71,7 @@ def section_figure(scene: Scene, path: Path) -> None:
     assert section.beam and section.root and section.head and section.rod_pin
     title = "A section: everything is measured from its inboard pivot"
     with sheet(path, title, [((-0.5, 4.35), (-0.58, 0.78))], 4.4) as (axes,):
-        draw_section(axes, section_parts(scene, bones, 0), section_depth(scene, 0))
+        draw_section(axes, section_parts(scene, bones, 0), scene.sections[0].depth)
         inboard, outboard, (x0, x1) = bones.point(0, 0), bones.point(0, section.length), section.beam
         rod, root, head = (bones.point(0, *p) for p in (section.rod_pin, section.root.com, section.head.com))
         axes.plot(*np.array([inboard, outboard]).T, color=GREY, linestyle=(0, (9, 3, 2, 3)), linewidth=1.0, zorder=3)
@@ -100,7 +100,7 @@ def joint_a_figure(scene: Scene, path: Path) -> None:
     joint = bones.joints[0]
     title = "Joint 1, kind A"
     with sheet(path, title, [((-1.45, 2.0), (-1.6, 0.98))], 8.0) as (axes,):
-        draw_section(axes, section_parts(scene, bones, 0), section_depth(scene, 0))
+        draw_section(axes, section_parts(scene, bones, 0), scene.sections[0].depth)
         draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, scene.joints[0].cylinder.closed_length, 0.1)
         draw_base(axes, joint.pivot, 0.24)
         draw_base(axes, joint.barrel_pin, 0.18)
@@ -137,7 +137,7 @@ def six_bar_figure(scene: Scene, i: int, phi: float, path: Path) -> None:
 def _linkage(axes: Any, scene: Scene, bones: Skeleton, i: int) -> None:
     joint = bones.joints[i]
     for k in (i - 1, i):
-        draw_section(axes, section_parts(scene, bones, k), 0.75 * section_depth(scene, k), 0.6)
+        draw_section(axes, section_parts(scene, bones, k), 0.75 * scene.sections[k].depth, 0.6)
     draw_link(axes, joint.links[0], GREEN, 7.0)
     draw_link(axes, joint.links[1], PURPLE, 7.0)
     draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, scene.joints[i].cylinder.closed_length, 0.07)
