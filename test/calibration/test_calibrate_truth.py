@@ -47,7 +47,7 @@ def test_everything_at_once_keeps_to_its_intervals(wrong_boom, tmp_path):
     wrong = errors(found, wrong_boom.truth, ENCODERS)
     for i, bound in enumerate((0.03, 0.02, 0.03, 0.08), start=1):
         assert abs(wrong[f"cylinder_{i}.k"]) < bound * parameter(wrong_boom.truth, f"cylinder_{i}.k")
-    assert abs(wrong["tip.payload"]) < 2.0
+    assert abs(wrong["tip.payload"]) < 3.0
     assert share_covered(found, wrong_boom.truth, ENCODERS) >= 0.8
     judge(found, 4)
 
@@ -62,7 +62,7 @@ def test_under_a_pump_and_wind_that_nobody_told(tmp_path):
     for i, bound in enumerate((0.02, 0.02, 0.02, 0.05), start=1):
         assert abs(wrong[f"cylinder_{i}.k"]) < bound * parameter(truth, f"cylinder_{i}.k")
         assert abs(wrong[f"joint_{i}.zero"]) < np.radians(0.01)
-    assert abs(wrong["tip.payload"]) < 2.0
+    assert abs(wrong["tip.payload"]) < 3.0
     assert share_covered(found, truth, ENCODERS) >= 0.8
     assert 0.9 < found.misfit < 1.15
 
