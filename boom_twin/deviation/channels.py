@@ -240,8 +240,7 @@ def measurement_of(
     for stream in lagging:
         lags[stream] = TIP_IMU_STATES + 2 * n + len(errors)
         errors += [(LAG_FIRST, LAG_WALK, True), (DRIFT_FIRST, DRIFT_WALK, False)]
-    streams = list(Stream)
-    lag_of = {code: lags.get(Stream(SENSORS[stream].beside or stream), -1) for code, stream in enumerate(streams)}
+    lag_of = {code: lags.get(Stream(SENSORS[stream].beside or stream), -1) for stream, code in codes.items()}
     rows = [(*row, lag_of[int(row[0])]) for row in rows]
     stations = np.array(bending).reshape(-1, len(plan.names))
     tables = _table(rows, CHANNEL), _table([row for row, _ in sites.found], SITE), _table(errors, ERROR)

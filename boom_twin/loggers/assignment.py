@@ -45,7 +45,7 @@ class Assignment:
         """Return the header of a column with its file."""
         return f"{self.tables[use.table].headers[use.place]!r} of {self.tables[use.table].source}"
 
-    def check(self, joints: int | None, drive: Stream) -> None:
+    def check(self, joints: int, drive: Stream) -> None:
         """Raise BagError for a column without unit, a file without times or channels, and a missing column of `drive`."""
         problems, found = list(self.problems), {use.channel for use in self.used}
         for number in sorted({use.table for use in self.used}):
@@ -66,7 +66,7 @@ class Assignment:
                 f"{self.header(use)}: {use.reason}" for use in self.unused if self.tables[use.table].source == source
             )
             problems.append(f"{source}: no column of a channel ({told}). Leave it out, or give --column CHANNEL=NAME:UNIT.")
-        driving = channels_of(joints or self.joints)[drive]
+        driving = channels_of(joints)[drive]
         if (missing := [channel for channel in driving if channel not in found]) and self.used:
             free = "; ".join(f"{self.header(use)} ({use.reason})" for use in self.unused) or "none"
             needs = "the length of every cylinder; a mapping with `drive: angles` needs all angles instead"

@@ -106,11 +106,11 @@ def import_session(
         The mapping or the time zone cannot be used.
     """
     assignment = assign(tables, given, joints)
-    by_angles = load_mapping(mapping, joints or assignment.joints).drive == "angles"
-    drive = Stream.ANGLES if by_angles else Stream.STROKES
-    assignment.check(joints, drive)
     joints = joints or assignment.joints
-    text, topics = _mapping(mapping, assignment, joints)
+    topics = load_mapping(mapping, joints)
+    drive = topics.stroke_reading.stream
+    assignment.check(joints, drive)
+    text, topics = _mapping(mapping, topics, assignment, joints)
     zone = zone_of(given.timezone) if given.timezone else None
     read = _read(assignment, given, zone)
     _check_spans(assignment, read, drive)
@@ -126,9 +126,8 @@ def import_session(
     return ImportedSession(assignment, read, counts)
 
 
-def _mapping(path: Path | None, assignment: Assignment, joints: int) -> tuple[str, Topics]:
-    """Return the session's mapping, with ``none`` as sensor of channels without a column."""
-    topics = load_mapping(path, joints)
+def _mapping(path: Path | None, topics: Topics, assignment: Assignment, joints: int) -> tuple[str, Topics]:
+    """Return the session's mapping, `topics` of `path`, with ``none`` as sensor of channels without a column."""
     text = "" if path is None else path.read_text(encoding="utf-8-sig")
     there = {use.channel for use in assignment.used}
     streams = {stream_of(channel) for channel in there}

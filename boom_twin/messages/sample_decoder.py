@@ -183,7 +183,7 @@ class SampleDecoder:
             else:
                 places, *_, is_regular = channels.look(names)
                 is_regular &= len(columns) == len(names)
-            is_regular &= frame == (self._frames.get(kind.beside or stream.value) or frame)
+            is_regular &= self._is_of_frame(stream, frame)
             own = [i for i, place in enumerate(places) if place >= 0]
             if not (is_regular and own and not kind.gives and ((stamps != 0) & (taken > 0) & (taken < LATEST)).all()):
                 return None
@@ -198,6 +198,10 @@ class SampleDecoder:
             self.assembler.note(*each, frame)
         return found
 
+    def _is_of_frame(self, stream: Stream, frame: str) -> bool:
+        """Return True if the mapping expects this ``frame_id``, or any."""
+        return frame == (self._frames.get(SENSORS[stream].beside or stream.value) or frame)
+
     def put(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:
         """Return the sample that a message of rclpy or of rosbags holds by itself; None if no value of it can be used."""
         reading = self._reading(stream, stamp_ns, msg)
@@ -211,7 +215,7 @@ class SampleDecoder:
             self.oddities["impossible stamp" if stamp_ns else "no stamp"] += 1
             return None
         frame = "" if is_by_name else msg.frame if isinstance(msg, Axes) else msg.header.frame_id
-        if frame != (self._frames.get(SENSORS[stream].beside or stream.value) or frame):
+        if not self._is_of_frame(stream, frame):
             self.oddities["another frame"] += not SENSORS[stream].beside
             return None
         raw, is_whole = self._by_name(msg, stream) if is_by_name else (self._by_axes(msg, stream), True)
