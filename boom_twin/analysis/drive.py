@@ -7,7 +7,6 @@ limited against overshoot. `scipy.interpolate.PchipInterpolator` is equal, but i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.plan import Plan, first_row, taken_apart, width_of
-from ..errors import SolverError
 from ..kernels.elements.pin_contact import LOST
-from ..kernels.integrators import GENERALISED_ALPHA, prepare
+from ..kernels.integrators import GENERALISED_ALPHA
 from ..kernels.result_row import Results
-from ..kernels.tables import OK, SENTENCES, State, Work
-from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance, run
+from ..kernels.tables import State, Work
+from ..kernels.transfer.time_step import run
 from ..types import Array
 
 
@@ -104,7 +102,7 @@ class DriveCourse:
         plan, state = self.plan, State(*(array.copy() for array in self.start))
         out = np.empty((len(rows), width_of(plan)))
         out[0] = first_row(plan, state)
-        steps, counts, drives, rates, loads = self._drive(self.times[rows], self.strokes[rows], dt, finer)
+        steps, counts, drives, rates, loads = self.steps(rows, dt, finer)
         self.work.load[:] = self.first_load
         status, row, passes, jolt, shake = run(
             plan.tables, state, self.work, steps, counts, drives, rates, loads, GENERALISED_ALPHA, self.rho, STEP_TOLERANCE,
@@ -116,38 +114,14 @@ class DriveCourse:
             float(counts @ steps**2), float(steps.max(initial=0.0)), at_rows, state.contacts[:, LOST].astype(np.int64), state,
         )  # fmt: skip
 
-    def states(self, dt: float, finer: int = 1) -> Iterator[tuple[float, State]]:
-        """Simulate through all rows in the steps of `stepped`; yield each step (s) and the state after it.
-
-        The same state object is yielded each time and changes with the next step; ``work.load[1]`` is its force at the tip.
-        SolverError if a step fails.
-        """
-        plan, work, state, row = self.plan, self.work, State(*(array.copy() for array in self.start)), 0
-        steps, counts, drives, rates, loads = self._drive(self.times, self.strokes, dt, finer)
-        work.load[:] = self.first_load
-        for span, count in zip(steps.tolist(), counts.tolist(), strict=True):
-            scheme = prepare(GENERALISED_ALPHA, self.rho, span, work.weights)
-            for _ in range(count):
-                if len(loads):
-                    work.load[:] = work.load[1], loads[row]
-                status, _, _ = advance(
-                    plan.tables, state, work, scheme, drives[row], rates[row], STEP_TOLERANCE, PASSES, LONGEST_INCREMENT, None,
-                    ANEW,
-                )  # fmt: skip
-                if status != OK:
-                    raise SolverError(f"step {row + 1} of {len(drives)} failed: {SENTENCES[status]}.")
-                row += 1
-                yield span, state
-
     @property
     def first_load(self) -> Array:
         """Force at the tip at the first row, N, shape (2,)."""
         return np.asarray(force_at(self.force, self.times[:1])[0])
 
-    def _drive(
-        self, times: Array, strokes: Array, dt: float, finer: int
-    ) -> tuple[Array, NDArray[np.int64], Array, Array, Array]:
-        """Return step size and count before every row but the first; drives, rates and tip forces after each step."""
+    def steps(self, rows: NDArray[np.int64], dt: float, finer: int) -> tuple[Array, NDArray[np.int64], Array, Array, Array]:
+        """Return step size and count before each of `rows` but the first; drives, rates and tip forces after each step."""
+        times, strokes = self.times[rows], self.strokes[rows]
         spans = np.diff(times)
         counts = finer * np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
         if len(spans) == 0:

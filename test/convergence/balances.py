@@ -22,9 +22,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ..compiler.plan import Plan
-from ..kernels.elements.cylinder import END_C
-from ..kernels.elements.pin_contact import (
+from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE, DriveCourse
+from boom_twin.compiler.plan import Plan
+from boom_twin.kernels.elements.cylinder import END_C
+from boom_twin.kernels.elements.pin_contact import (
     BARREL_END_PIN,
     CLEARANCE,
     DAMPER,
@@ -39,13 +40,13 @@ from ..kernels.elements.pin_contact import (
     approach,
     penetration,
 )
-from ..kernels.integrators import A, V, X
-from ..kernels.tables import Motion, State, Work
-from ..kernels.transfer.clearance_pins import axis_of, load_pins, torque_of
-from ..kernels.transfer.forward_kinematics import place
-from ..kernels.transfer.riccati_sweep import FREE, clear_cut, sweep_in
-from ..types import Array
-from .drive import DriveCourse
+from boom_twin.kernels.integrators import GENERALISED_ALPHA, A, V, X, prepare
+from boom_twin.kernels.tables import OK, SENTENCES, Motion, State, Work
+from boom_twin.kernels.transfer.clearance_pins import axis_of, load_pins, torque_of
+from boom_twin.kernels.transfer.forward_kinematics import place
+from boom_twin.kernels.transfer.riccati_sweep import FREE, clear_cut, sweep_in
+from boom_twin.kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
+from boom_twin.types import Array
 
 FINER = 32  # sub-steps of a step where journals touch and part: as many as a step is divided into at most
 
@@ -172,15 +173,6 @@ class EnergyBalance:
         """`gap` as a share of `moved`."""
         return self.gap / self.moved if self.moved > 0.0 else 0.0
 
-    def __str__(self) -> str:
-        return (
-            f"energy: drives and force at the tip did {self.work:.6g} J; kinetic and potential energy changed by "
-            f"{self.change:.6g} J, "
-            f"damping took {self.damping:.4g} J, contact {self.contact:.4g} J. "
-            f"The balance is open by {self.gap:.3g} J at most, {100.0 * self.share:.2g} % of {self.moved:.4g} J moved; "
-            f"in the end time integration (steps of {self.step:.3g} s) took {self.left:.3g} J"
-        )
-
 
 def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
     """Return the balance along a motion in steps of at most `dt` (s), divided by `FINER` where journals touch and part."""
@@ -207,8 +199,22 @@ def tip_power(course: DriveCourse, state: State) -> Array:
 
 
 def states_of(course: DriveCourse, dt: float) -> Iterator[tuple[float, State]]:
-    impacts = bool((course.plan.tables.clearances.linear == 0).any())
-    return course.states(dt, FINER if impacts else 1)
+    """Yield each step (s) and the state after it, which changes with the next; ``work.load[1]`` is its force at the tip."""
+    plan, work, state, row = course.plan, course.work, State(*(array.copy() for array in course.start)), 0
+    finer = FINER if (plan.tables.clearances.linear == 0).any() else 1
+    steps, counts, drives, rates, loads = course.steps(np.arange(len(course.times)), dt, finer)
+    work.load[:] = course.first_load
+    for span, count in zip(steps.tolist(), counts.tolist(), strict=True):
+        scheme = prepare(GENERALISED_ALPHA, course.rho, span, work.weights)
+        for _ in range(count):
+            if len(loads):
+                work.load[:] = work.load[1], loads[row]
+            status, _, _ = advance(
+                plan.tables, state, work, scheme, drives[row], rates[row], STEP_TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW
+            )
+            assert status == OK, SENTENCES[status]
+            row += 1
+            yield span, state
 
 
 BEHIND_PIVOT = np.int64(1)  # the operation outboard of joint A, up to which forces are swept in
@@ -285,13 +291,6 @@ class MomentumBalance:
     def angular_share(self) -> float:
         """`angular_gap` as a share of `angular_moved`."""
         return self.angular_gap / self.angular_moved if self.angular_moved > 0.0 else 0.0
-
-    def __str__(self) -> str:
-        return (
-            f"momentum: differs from the impulse of weight and base by {self.linear_gap:.3g} N s at most, "
-            f"{100.0 * self.linear_share:.2g} % of {self.linear_moved:.4g} N s; its moment about the base's pivot by "
-            f"{self.angular_gap:.3g} N m s, {100.0 * self.angular_share:.2g} % of {self.angular_moved:.4g} N m s"
-        )
 
 
 def momentum_balance(course: DriveCourse, dt: float) -> MomentumBalance:
