@@ -45,7 +45,6 @@ COMMANDS = {  # small outputs of users' commands: what they print as JSON or tex
     "resonance map": "response --map all --pump 0.4:130 --rates 0.2:1.2:21 --json --out {out}",
     "simulate": "simulate --drive {drive} --out {out}/motion.csv --json",
     "simulate lengths": "simulate --lengths {drive} --out {out}/motion.csv --json --no-error-estimate",
-    "simulate from undeflected": "simulate --drive {drive} --out {out}/motion.csv --start undeflected --json",
     "play: statics": "statics --scene {play} --posture arch --json",
     "play: simulate": "simulate --scene {play} --drive {drive} --out {out}/motion.csv --json",
     "Z fold: statics": "statics --scene {z_fold} --strokes={z_strokes} --json",
