@@ -49,7 +49,9 @@ def read_text(path: Path, kind: Kind = SCENE) -> str:
         return data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         if isinstance(error, UnicodeDecodeError):
-            raise _refusal(kind, str(path), *_not_utf8(data, error)) from None
+            line = data[: error.start].count(b"\n") + 1
+            bound = f"line {line} has bytes that are no text in UTF-8"
+            raise _refusal(kind, str(path), bound, "Give a text file in YAML, saved with the encoding UTF-8.") from None
         reason = getattr(error, "strerror", None) or str(error)
         remedy = f"Give the path of a {kind.name} file; `{kind.example}` prints one to start from."
         raise _refusal(kind, str(path), reason, remedy) from None
@@ -67,19 +69,6 @@ def parse(text: str, source: str, kind: Kind = SCENE) -> Document:
     if reader.is_empty:
         raise _refusal(kind, source, "the file is empty", f"Start from the one that `{kind.example}` prints.")
     return reader.document
-
-
-def _not_utf8(data: bytes, error: UnicodeDecodeError) -> tuple[str, str]:
-    """Return what a file is instead of UTF-8 text, and the remedy."""
-    if data.startswith((b"PK", b"\xd0\xcf\x11\xe0")):  # zip, as .xlsx and .ods; .xls
-        return "this is not a text file but a spreadsheet's own or an archive", "Save a spreadsheet as `CSV UTF-8`."
-    if b"\0" in data:
-        return "this is not a text file in UTF-8", "Give a scene or a table in YAML, or a table in CSV."
-    line = data.count(b"\n", 0, error.start) + 1
-    return (
-        f"line {line} has a character that is not UTF-8, byte {data[error.start]:#x}",
-        "Save the file with the encoding UTF-8.",
-    )
 
 
 def _refusal(kind: Kind, source: str, bound: str, remedy: str) -> SceneError:
