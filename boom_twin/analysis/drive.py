@@ -14,12 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.plan import Plan, first_row, taken_apart, width_of
+from ..errors import SolverError
+from ..kernels.elements.cylinder import write_drives
 from ..kernels.elements.pin_contact import LOST
 from ..kernels.integrators import GENERALISED_ALPHA
 from ..kernels.result_row import Results
 from ..kernels.tables import State, Work
 from ..kernels.transfer.time_step import run
-from ..types import Array
+from ..system.summary_display import numbers
+from ..types import Array, StrokeReading
 
 
 def pchip(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
@@ -132,3 +135,42 @@ class DriveCourse:
         at = np.repeat(times[:-1], counts) + inside * np.repeat(steps, counts)
         lengths, rates = pchip(times, self.plan.closed_lengths + strokes, np.minimum(at, times[-1]))
         return steps, counts, lengths, rates, force_at(self.force, at) if len(self.force) else np.zeros((0, 2))
+
+
+def spring_free(plan: Plan, lengths: Array, forces: Array) -> Array:
+    """Return the drives (m), shape (n,), of cylinders that are `lengths` (m) long at rest under `forces` (N)."""
+    drives = drives_as_read(plan, lengths, forces, StrokeReading.LENGTH)
+    if np.isfinite(drives).all():
+        return drives
+    raise SolverError(f"no drives for cylinder forces of {numbers(forces)} N: the oil gives too much. Check bulk_modulus.")
+
+
+def drives_as_read(plan: Plan, strokes: Array, forces: Array, reads: StrokeReading) -> Array:
+    """Return the drives (m) where transducers read `strokes` (m) under `forces` (N), all (.., n); NaN if there are none.
+
+    At work lengths swing with the forces in the oil. Drives show how the boom is driven, and in which posture it would rest.
+    The oil's damping is left out: its lag is some milliseconds.
+    """
+    drives = np.array(strokes)
+    if reads is not StrokeReading.DRIVE:
+        write_drives(
+            plan.tables.cylinders, plan.tables.oils, np.ascontiguousarray(np.atleast_2d(forces)), np.atleast_2d(drives)
+        )
+    return drives
+
+
+def drives_of(plan: Plan, times: Array, lengths: Array, forces: Array) -> Array:
+    """Return the drives (m), shape (m, n), of cylinders with these lengths (m) and forces (N) at `times` (s), at rest at first.
+
+    The extension x of an oil spring follows d x' + k x = F. The solution is exact for forces that are linear from row to row.
+    """
+    drives = [spring_free(plan, lengths[0], forces[0])]
+    for span, now, before, after in zip(np.diff(times), lengths[1:], forces, forces[1:], strict=False):
+        extension = lengths[len(drives) - 1] - drives[-1]
+        compliance, lag = plan.compliances_and_lags(plan.closed_lengths + now - extension)
+        with np.errstate(divide="ignore"):
+            kept = np.exp(-span / lag)
+        start, end = compliance * before, compliance * after
+        lead = (end - start) / span * lag
+        drives.append(now - (end - lead + (extension - start + lead) * kept))
+    return np.array(drives)

@@ -20,7 +20,6 @@ from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
 from ..system.summary_display import SummaryDisplay, data_frame, numbers
 from ..types import Array
-from .cylinder_drives import drives_of
 from .doubts import (
     EstimatedError,
     joint_doubts,
@@ -31,7 +30,7 @@ from .doubts import (
     too_fast,
     warnings_of,
 )
-from .drive import NO_FORCE, DriveCourse, Run, force_at
+from .drive import NO_FORCE, DriveCourse, Run, drives_of, force_at
 from .equilibrium import rest_at, travel_words
 from .steady_state import LARGEST_FORCE
 

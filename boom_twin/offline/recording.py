@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.column_statistics import ColumnStatistics
+from ..analysis.sample_series import ColumnStatistics
 from ..deviation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms
 from ..twin.blocks import CODES, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined, report_block

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..analysis.frequency_response import FrequencyResponse
-    from ..analysis.resonance_map import ResonanceMap
-    from ..analysis.steady_state import SteadyState
+    from ..analysis.steady_state import ResonanceMap, SteadyState
 
 
 def response_picture(path: Path, title: str, unit: str, response: FrequencyResponse, natural: Array) -> None:

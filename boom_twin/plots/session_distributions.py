@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.column_statistics import ColumnStatistics
-from ..analysis.even_times import power_density, spacing, unbroken
+from ..analysis.sample_series import ColumnStatistics, power_density, spacing, unbroken
 from ..types import Array
 from .history import Density, History, ResidualDistribution, SessionDistributions
 

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis.bending_moments import Station, stations
-from ..analysis.bending_stress import BendingStressModel
+from ..analysis.bending_stress import BendingStressModel, Station, stations
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..plots import History

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis.cylinder_drives import drives_as_read
+from ..analysis.drive import drives_as_read
 from ..analysis.equilibrium import settle
 from ..compiler.compile import compile_scene
 from ..compiler.plan import first_row, taken_apart

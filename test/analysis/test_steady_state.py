@@ -8,12 +8,13 @@ from default_boom import strokes_of_posture
 from oracle import booms
 
 from boom_twin import UsageError, frequency_response, load_scene, simulate, statics
-from boom_twin.analysis.resonance_map import named_postures, resonance_map
 from boom_twin.analysis.steady_state import (
     INSTANTS,
     PeriodicLoad,
     load_of_rows,
+    named_postures,
     pump_load,
+    resonance_map,
     steady_state,
 )
 from boom_twin.scene.pump_pulses import upward

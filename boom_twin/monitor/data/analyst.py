@@ -11,7 +11,7 @@ import numpy as np
 
 from ...analysis.frequency_response import UPWARD, linearised_boom
 from ...analysis.posture_modes import MOVED, ModeList, PresentPosture
-from ...analysis.resonance_map import TOO_MUCH
+from ...analysis.steady_state import TOO_MUCH
 from ...errors import BoomTwinError
 from ...scene.pump_pulses import CHANGE_OVER
 from ...scene.schema import Scene
@@ -80,7 +80,7 @@ def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
     """Return the ranges of pump rates (Hz) at which the tip swings `TOO_MUCH` times as far as at the median rate.
 
     `accelerations` (k,) of the tip (m/s^2) by 1 N are at `RESPONSE_FREQUENCIES`. The rule is that of
-    `boom_twin.analysis.resonance_map`: root mean square for peak to peak.
+    `boom_twin.analysis.steady_state`: root mean square for peak to peak.
     """
     swings = accelerations / (2.0 * np.pi * RESPONSE_FREQUENCIES) ** 2
     at = HARMONICS * PUMP_RATES[:, None]

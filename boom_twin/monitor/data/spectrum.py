@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks, hilbert, periodogram
 
-from ...analysis.even_times import power_density, spacing
+from ...analysis.sample_series import power_density, spacing
 from ...types import Array
 
 SPECTRUM_SPAN = 40.0  # time span of the spectrum, up to the shown time, s

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.motions import DURATION
+from ...analysis.methods import DURATION
 from ...errors import SolverError
 from ...plots.study import Bars, parts_picture
 from ...reduction.deviation import (

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ....analysis.methods import integrate_with
-from ....analysis.motions import Motion
+from ....analysis.methods import Motion, integrate_with
 from ....errors import BoomTwinError
 from ....scene.schema import Scene
 from ....types import Array

@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from ....analysis.motions import DURATION, motion_of
+from ....analysis.methods import DURATION, motion_of
 from ....offline.progress import progress_of
 from ....plots.study import Curve, Panel, work_precision_picture
 from ....plots.style import BLUE, ORANGE, SKY, TONES
