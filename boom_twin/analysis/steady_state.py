@@ -2,8 +2,7 @@
 
 The load stands for `INSTANTS` even instants of a period, of a long period as many as its harmonics up to `HIGHEST_HARMONIC`
 need; every harmonic whose amplitude is above `NEGLIGIBLE` of the largest is answered by the boom linearised at rest, its mean
-by the static limit, and the answers are added up in time. Where a load goes straight from row to row its harmonics are exact
-(`polygon_series`): instants of it alone would take what is faster than half their rate for something slower.
+by the static limit, and the answers are added up in time.
 
 A pump pulse has many harmonics, so a boom swings most where one of them meets a natural frequency, not only at that frequency
 itself: with a first mode at 1.06 Hz already at 0.35 Hz, by the third harmonic.
@@ -30,7 +29,6 @@ INSTANTS = 2048
 HIGHEST_HARMONIC = 200.0  # Hz; far above what moves a boom
 PERIODS = (0.01, 2000.0)  # s, shortest and longest: the model ends at some 100 Hz, and harmonics cost time
 LARGEST_FORCE = 1e7  # N; far above what any boom bears
-MOST_TERMS = 2e9  # rows times harmonics that are summed one by one, where rows are not even in time
 NEGLIGIBLE = 1e-6
 
 
@@ -66,7 +64,7 @@ def pump_load(scene: Scene, frequency: float, height: float, change_over: float 
 
 
 def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
-    """Return a load that goes straight from row to row, with harmonics up to `HIGHEST_HARMONIC`.
+    """Return a load that goes straight from row to row.
 
     `times` (m,), s, increase; `forces` (m, 2), N. The last row ends the period with the force of the first. UsageError
     otherwise.
@@ -89,9 +87,8 @@ def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
             "The last row ends the period: give it the force of the first."
         )
     period = float(times[-1] - times[0])
-    count = len(_instants(period))
-    series = polygon_series(times, forces, count // 2)
-    return PeriodicLoad(period, np.fft.irfft(count * series, count, axis=0))
+    instants = times[0] + _instants(period)
+    return PeriodicLoad(period, np.stack([np.interp(instants, times, column) for column in forces.T], axis=1))
 
 
 def _instants(period: float) -> Array:
@@ -101,32 +98,6 @@ def _instants(period: float) -> Array:
         raise UsageError(f"load: its period of {period:g} s must be {low:g} to {high:g} s. Give another rate.")
     count = 2 * max(INSTANTS // 2, math.ceil(HIGHEST_HARMONIC * period))
     return period * np.arange(count) / count
-
-
-def polygon_series(times: Array, values: Array, count: int) -> ComplexArray:
-    """Return the Fourier coefficients 0 to `count` - 1 of what goes straight from row to row and repeats, exactly.
-
-    Its second derivative is a sum of impulses, as large as its slope changes at the rows, which gives
-    c_k = sum_j ds_j e^(-i w_k t_j) / (T (i w_k)^2), w_k = 2 pi k / T. `times` (m,), s, increase, and the last ends the period;
-    `values` (m, columns) end as they begin. UsageError for rows uneven in time that are too many for so many coefficients.
-    """
-    period, rows = times[-1] - times[0], len(times) - 1
-    slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
-    changes = slopes - np.roll(slopes, 1, axis=0)
-    at, numbers = (times[:-1] - times[0]) / period, np.arange(1, count)
-    found = np.zeros((count, values.shape[1]), complex)
-    found[0] = np.trapezoid(values, times, axis=0) / period
-    if np.allclose(at * rows, np.arange(rows), rtol=0.0, atol=1e-9 * rows):
-        impulses = np.fft.fft(changes, axis=0)[numbers % rows]
-    elif rows * count <= MOST_TERMS:
-        parts = np.array_split(numbers, 1 + rows * count // 10**6)
-        impulses = np.concatenate([np.exp(-2j * math.pi * np.outer(part, at)) @ changes for part in parts])
-    else:
-        raise UsageError(
-            f"load: {rows} rows that are not even in time are too many for a period of {period:g} s. Make them even."
-        )
-    found[1:] = impulses * (period / (2j * math.pi * numbers[:, None]) ** 2)
-    return found
 
 
 @dataclass(frozen=True)

@@ -205,7 +205,6 @@ PLAUSIBILITY: tuple[Callable[[Draft, Scene], Findings], ...] = (
     sizes.rigid_parts,
     sizes.moving_parts,
     linkages.clear_cylinders,
-    linkages.spaced_pins,
 )
 """Of a scene without faults: parts against each other."""
 

@@ -1,7 +1,4 @@
-"""Pins and cylinder of a joint over its range: dead centres, what runs over the pivot, what comes too close.
-
-A pin goes through the whole width of the boom, so two of them need room beside each other in whatever planes the links lie. A
-link may run over the pivot, for it lies beside the section. In most six-bars that turn 165 degrees it does.
+"""Pins and cylinder of a joint over its range: levers, angle of the links, nearest pins, pins in the way of a cylinder.
 
 A cylinder lies amid the section, where the pivot's pin and those of the links pass through. Its barrel is taken as thick as its
 bore and two walls, its rod as thick as it is, a pin as half the bore. Only `oil` gives them: a cylinder with `k` is not judged.
@@ -25,10 +22,8 @@ from . import Draft, Findings
 from .geometry import Mask, grid_of, usable
 
 PIN = 0.5  # diameter of a pin over the bore
-BORE = 0.4  # of a cylinder without `oil`, over the depth of the section that turns
 WALL = 0.12  # of a barrel, over its bore
 BARREL = 0.9  # of the closed length; the rest is the rod's end and its eye
-ROOM = 1.25  # between the centres of two pins, over the diameter: a quarter of it is left for the eyes around them
 
 
 @dataclass(frozen=True)
@@ -51,8 +46,6 @@ class LinkageAccount:
     """Least angle between the links; None for kind A."""
     nearest: Nearest | None
     """Nearest of the pins that move against each other; None for kind A."""
-    over_pivot: tuple[str, ...]
-    """What runs over the pivot's pin, with the angle where it is in the middle of it: ``link L at -142 deg``."""
 
 
 def linkage_account(scene: Scene, i: int) -> LinkageAccount:
@@ -61,13 +54,7 @@ def linkage_account(scene: Scene, i: int) -> LinkageAccount:
     pins = joint_pins(scene, i, np.radians(degrees))
     _, levers, between = joint_curve(row, np.radians(degrees))
     lever, least = (float(np.nanmin(levers)), float(np.nanmax(levers))), float(np.nanmin(between)) if i else None
-    return LinkageAccount(lever, least, nearest_pins(pins, degrees), _over_pivot(scene, i, pins, degrees))
-
-
-def pin_diameter(scene: Scene, i: int) -> float:
-    """Return the assumed diameter (m) of the pins of joint `i` (0-based): half the bore, which is guessed without `oil`."""
-    oil = scene.joints[i].cylinder.oil
-    return PIN * (BORE * scene.sections[i].depth if oil is None else oil.bore)
+    return LinkageAccount(lever, least, nearest_pins(pins, degrees))
 
 
 def nearest_pins(pins: dict[str, Array], degrees: Array) -> Nearest | None:
@@ -87,20 +74,6 @@ def distances_to(point: Array, start: Array, end: Array) -> tuple[Array, Array]:
     along = end - start
     place = np.clip(((point - start) * along.conj()).real / np.abs(along) ** 2, 0.0, 1.0)
     return np.abs(point - start - place * along), place
-
-
-def _over_pivot(scene: Scene, i: int, pins: dict[str, Array], degrees: Array) -> tuple[str, ...]:
-    rod = rod_pin_of(pins)
-    lines = {"cylinder": ("C" if i else "cylinder_pin", rod)}
-    if i:
-        lines |= {"link L": ("D", "Q"), "link R": ("E", "Q")}
-    found = []
-    for name, (start, end) in lines.items():
-        distance, _ = distances_to(pins["the pivot"], pins[start], pins[end])
-        at = int(np.nanargmin(distance))
-        if distance[at] < 0.5 * pin_diameter(scene, i):
-            found.append(f"{name} at {degrees[at]:.0f} deg")
-    return tuple(found)
 
 
 class Pass(NamedTuple):
@@ -163,25 +136,3 @@ def _pins_before(scene: Scene, i: int, pivot: Array) -> dict[str, Array]:
             pivot + (complex(*inner) - carrier.length)
         )
     return found
-
-
-def spaced_pins(draft: Draft, scene: Scene) -> Findings:
-    """Yield a warning for each six-bar whose two closest pins have less room than they need."""
-    for i, joint in enumerate(scene.joints):
-        degrees = grid_of(joint)
-        pins, needed = joint_pins(scene, i, np.radians(degrees)), ROOM * pin_diameter(scene, i)
-        nearest = nearest_pins(pins, degrees)
-        if nearest is None or nearest.distance >= needed:
-            continue
-        apart = np.abs(pins[nearest.first] - pins[nearest.second])
-        low, high = usable(degrees, np.where(apart >= needed, degrees, np.nan))
-        narrower = f", or narrow range_deg to [{low:g}, {high:g}]" if low < high else ""
-        oil = joint.cylinder.oil
-        bore = "the bore" if oil else f"a bore guessed as {BORE:g} of the depth of the section"
-        bound = (
-            f"at {nearest.degrees:.0f} deg {nearest.first} and {nearest.second} are {nearest.distance:.3f} m apart; "
-            f"expected at least {needed:.3f} m, pins {pin_diameter(scene, i):.3f} m thick ({PIN:g} of {bore}) with their eyes"
-        )
-        key = next((name for name in ("R", "E", "D", "C") if name in (nearest.first, nearest.second)), "lL")
-        remedy = f"Look at `check --picture`; move C, D, E or R, or change lL or lR{narrower}."
-        yield draft.warning(("joints", i, key), getattr(joint, key), bound, remedy)
