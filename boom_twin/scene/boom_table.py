@@ -91,13 +91,13 @@ def read_table(path: Path) -> tuple[BoomTable, Document]:
     if isinstance(document.values, dict) and "gravity" in document.values:
         bound, remedy = "only a scene has it, and this is to be a table of dimensions", "`boom_twin check` takes a scene."
         raise SceneError(source, (document.fault(("gravity",), document.values["gravity"], bound, remedy),))
-    read = validated(document, BoomTable)
-    faults = [*read.faults, *document.faults]
-    if read.block is not None:
-        faults += _faults(document, read.block)
-    if faults or read.block is None:
+    table, faults = validated(document, BoomTable)
+    faults += document.faults
+    if table is not None:
+        faults += _faults(document, table)
+    if faults or table is None:
         raise SceneError(source, tuple(sorted(faults, key=lambda fault: fault.line or 0)))
-    return read.block, document
+    return table, document
 
 
 def _faults(document: Document, table: BoomTable) -> list[Fault]:

@@ -20,7 +20,8 @@ from ruamel.yaml.error import YAMLError
 
 from ..config.yaml_text import Place, with_values, words, yaml_text
 from ..errors import SceneError, UsageError
-from .load import examine_text, parse, structure, text_of
+from .block_reader import validated
+from .load import examine_text, parse, text_of
 from .oil_spring import middle_stiffness
 from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
 
@@ -157,7 +158,7 @@ def rewritten(text: str, scene: Scene, wanted: Scene) -> str:
     """
     try:
         text = with_values(text, _changes(scene.model_dump(), wanted.model_dump(), ()))
-        found, _, faults = structure(parse(text, "changed scene"))
+        found, faults = validated(parse(text, "changed scene"), Scene)
     except (YAMLError, SceneError):
         return anew(wanted)
     same = found is not None and not faults and _same(found.model_dump(), wanted.model_dump())

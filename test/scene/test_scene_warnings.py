@@ -37,7 +37,7 @@ GEOMETRY = [
     ("joints[1].lL -> joints[1].range_deg", 0.55, "do not meet at -165.0 to -115.4 deg", "Narrow range_deg to [-49, 10]",
      "|lL - lR| = 0.173 m must be less"),
     ("sections[0].rod_pin", [0.61, -0.12], "splits the beam 10 mm from its end", "x = 0.61"),
-    ("sections[1].head.com", [-3.18, 0.0], "far outside", "inboard pivot"),
+    ("sections[1].head.com", [-3.18, 0.0], "inside the head", "INBOARD pivot"),
 ]  # fmt: skip
 
 SLIPS = [

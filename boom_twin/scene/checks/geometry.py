@@ -1,4 +1,4 @@
-"""Geometry of a scene: pins and centres of mass on their parts; a joint over its range.
+"""Geometry of a scene: pins on their parts; a joint over its range.
 
 Over its range the links of a joint meet, its strokes are within reach and unique, it keeps clear of dead centres, and it holds
 the named postures.
@@ -7,7 +7,6 @@ the named postures.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -15,10 +14,9 @@ from numpy.typing import NDArray
 
 from ...config.yaml_text import Place
 from ...types import Array
-from ..kinematics import joint_curve, linkage_of
-from ..schema import Joint, Point, Section
+from ..kinematics import joint_curve, linkage
+from ..schema import Joint, Point, Scene
 from . import Draft, Findings
-from .values import NEEDED
 
 ROUNDING = 1e-9  # m, deg
 RIGID = (math.inf, -math.inf)  # ends of the flexible part of a rigid section: every pin is on its root and on its head
@@ -34,66 +32,46 @@ Mask = NDArray[np.bool_]
 
 def placed_pins(draft: Draft) -> Findings:
     """Check that D is on the rigid head of the section before, E on the rigid root of its own, C near the section before."""
-    for i, joint in enumerate(draft.joints):
-        before, own = draft.section(i - 1), draft.section(i)
-        if i == 0 or joint is None:
-            continue
-        if before is not None and joint.C is not None and _far(before.length, (before.length + joint.C[0], joint.C[1])):
-            bound = f"C lies far outside sections[{i - 1}], which is {before.length:g} m long"
+    scene = draft.scene
+    for i, joint in enumerate(scene.joints[1:], 1):
+        assert joint.C is not None and joint.D is not None and joint.E is not None
+        length, first, last = scene.sections[i - 1].length, _bending(scene, i - 1)[1], _bending(scene, i)[0]
+        if _far(length, (length + joint.C[0], joint.C[1])):
+            bound = f"C lies far outside sections[{i - 1}], which is {length:g} m long"
             remedy = "C is measured from the OUTBOARD pivot of the section before, so its x is negative."
             yield draft.warning(("joints", i, "C"), joint.C, bound, remedy)
-        first = -math.inf if before is None else _bending(draft, before)[1] - before.length
-        if before is not None and joint.D is not None and joint.D[0] < first - ROUNDING:
-            bound = f"D must lie on the rigid head of sections[{i - 1}], x >= {first:.6g} m from its outboard pivot"
-            remedy = f"Move D, or end the beam of sections[{i - 1}] at x1 <= {before.length + joint.D[0]:.6g} m."
+        if joint.D[0] < first - length - ROUNDING:
+            bound = f"D must lie on the rigid head of sections[{i - 1}], x >= {first - length:.6g} m from its outboard pivot"
+            remedy = f"Move D, or end the beam of sections[{i - 1}] at x1 <= {length + joint.D[0]:.6g} m."
             yield draft.fault(("joints", i, "D"), joint.D, bound, remedy)
-        if own is not None and joint.E is not None and joint.E[0] > (last := _bending(draft, own)[0]) + ROUNDING:
+        if joint.E[0] > last + ROUNDING:
             bound = f"E must lie on the rigid root of sections[{i}], x <= {last:.6g} m from its inboard pivot"
             remedy = f"Move E, or start the beam of sections[{i}] at x0 >= {joint.E[0]:.6g} m."
             yield draft.fault(("joints", i, "E"), joint.E, bound, remedy)
 
 
-def _bending(draft: Draft, section: Section) -> Point:
-    """Return the ends of the flexible part; inf, -inf if it is rigid or its ends are wrong, which another check says."""
-    beam = section.beam if section.beam is not None and draft.modes_of(section) > 0 else RIGID
-    return beam if 0 <= beam[0] < beam[1] <= section.length else RIGID
+def _bending(scene: Scene, i: int) -> Point:
+    """Return the ends of the flexible part of section `i`; inf, -inf if it is rigid."""
+    return scene.sections[i].beam or RIGID if scene.is_flexible(i) else RIGID
 
 
 def thin_parts(draft: Draft) -> Findings:
     """Yield warnings of pins just beside an end of the beam, which cut off a sliver of it."""
-    for i, section in enumerate(draft.sections):
-        if section is None:
-            continue
-        following = draft.joints[i + 1] if i + 1 < len(draft.joints) else None
-        if following is not None and following.C is not None:
-            yield from _sliver(draft, section, ("joints", i + 1, "C"), following.C, section.length + following.C[0])
-        if i == 0 and section.rod_pin is not None:
-            yield from _sliver(draft, section, ("sections", i, "rod_pin"), section.rod_pin, section.rod_pin[0])
+    for i, section in enumerate(draft.scene.sections):
+        pins: list[tuple[Place, Point, float]] = []
+        if i + 1 < len(draft.scene.joints) and (c := draft.scene.joints[i + 1].C) is not None:
+            pins.append((("joints", i + 1, "C"), c, section.length + c[0]))
+        if section.rod_pin is not None:
+            pins.append((("sections", i, "rod_pin"), section.rod_pin, section.rod_pin[0]))
+        beam = _bending(draft.scene, i)
+        for place, value, x in pins:
+            for end in beam if beam[0] < x < beam[1] else ():
+                if ROUNDING < abs(x - end) < 0.01 * section.length:
+                    bound = f"the pin splits the beam {abs(x - end) * 1e3:.3g} mm from its end, at x = {end:g} m"
+                    yield draft.warning(place, value, bound, f"Let the beam end at the pin, x = {x:.6g} m, or move the pin.")
 
 
-def _sliver(draft: Draft, section: Section, place: Place, value: Point, x: float) -> Findings:
-    beam = _bending(draft, section)
-    for end in beam:
-        if ROUNDING < abs(x - end) < 0.01 * section.length and beam[0] < x < beam[1]:
-            bound = f"the pin splits the beam {abs(x - end) * 1e3:.3g} mm from its end, at x = {end:g} m"
-            yield draft.warning(place, value, bound, f"Let the beam end at the pin, x = {x:.6g} m, or move the pin.")
-
-
-def centres(draft: Draft) -> Findings:
-    """Check that centres of mass, and the rod pin, are near their section."""
-    for i, section in enumerate(draft.sections):
-        if section is None:
-            continue
-        parts: list[tuple[Place, Point | None]] = [(("rod_pin",), section.rod_pin)]
-        parts += [((end, "com"), part.com) for end, part in (("root", section.root), ("head", section.head)) if part]
-        for place, point in parts:
-            if point is not None and _far(section.length, point):
-                bound = f"it lies far outside the section, which is {section.length:g} m long"
-                remedy = "It is measured from the inboard pivot, along the section."
-                yield draft.warning(("sections", i, *place), point, bound, remedy)
-
-
-def _far(length: float, point: tuple[float, float]) -> bool:
+def _far(length: float, point: Point) -> bool:
     """Return True if a point is more than a quarter of the length beyond the section's ends, or half of it beside."""
     return not -0.25 * length <= point[0] <= 1.25 * length or abs(point[1]) > 0.5 * length
 
@@ -103,14 +81,13 @@ def _far(length: float, point: tuple[float, float]) -> bool:
 
 def joints(draft: Draft) -> Findings:
     """Check every joint over its range_deg: closing, reach, uniqueness, and the named postures in it."""
-    for i, joint in enumerate(draft.joints):
-        if joint is None or not -360 <= joint.range_deg[0] < joint.range_deg[1] <= 360:
-            continue
-        row = geometry_of(draft, i)
-        findings = [] if row is None else list(_curve(draft, i, joint, row))
+    for i, joint in enumerate(draft.scene.joints):
+        row = linkage(draft.scene, i)
+        findings = list(_curve(draft, i, joint, row))
         yield from findings
-        blocked = row is None or any(finding.kind == "fault" for finding in findings)
-        for name, degrees in _postures(draft, i):
+        blocked = any(finding.kind == "fault" for finding in findings)
+        for name, angles in draft.scene.postures.items():
+            degrees = angles[i] - (angles[i - 1] if i > 0 else 0.0)
             yield from _posture(draft, (name, i), joint, degrees, None if blocked else row)
 
 
@@ -254,34 +231,16 @@ def usable(degrees: Array, lengths: Array) -> tuple[float, float]:
     return (whole_low, whole_high) if whole_low < whole_high else (low, high)
 
 
-def geometry_of(draft: Draft, i: int) -> np.record | None:
-    """Return the geometry of joint `i`; None if it is not complete."""
-    joint, first = draft.joints[i], draft.section(0)
-    if joint is None or (i == 0) != (joint.kind == "A"):
-        return None
-    if joint.kind == "A":
-        complete = draft.base is not None and first is not None and first.rod_pin is not None
-    else:
-        complete = all(getattr(joint, key) is not None for key in NEEDED[joint.kind])
-    return linkage_of(joint, draft.base, first) if complete else None
-
-
 def _reached(joint: Joint, lengths: Array) -> Mask:
     """Return a mask of the angles at which the cylinder can be as long as the geometry asks; False where links do not meet."""
     strokes = lengths - joint.cylinder.closed_length
     return (strokes >= -ROUNDING) & (strokes <= joint.cylinder.max_stroke + ROUNDING)
 
 
-def _postures(draft: Draft, i: int) -> Iterator[tuple[str, float]]:
-    for name, angles in draft.postures.items():
-        if len(angles) == len(draft.joints):
-            yield name, angles[i] - (angles[i - 1] if i > 0 else 0.0)
-
-
 def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, row: np.record | None) -> Findings:
     """Check joint `who[1]` in posture `who[0]`: its angle in range_deg and, if its geometry is known, its stroke."""
     name, i = who
-    place, value = ("postures", name, i), draft.postures[name][i]
+    place, value = ("postures", name, i), draft.scene.postures[name][i]
     low, high = joint.range_deg
     says = f"posture `{name}` turns joint {i + 1} to {degrees:g} deg"
     if not low - ROUNDING <= degrees <= high + ROUNDING:

@@ -85,8 +85,9 @@ class Pass(NamedTuple):
     at_barrel: Mask
 
 
-def clear_cylinders(draft: Draft, scene: Scene) -> Findings:
+def clear_cylinders(draft: Draft) -> Findings:
     """Check all cylinders that have `oil`; of each the pin that is closest against what it needs."""
+    scene = draft.scene
     for i, joint in enumerate(scene.joints):
         if joint.cylinder.oil is not None:
             degrees = grid_of(joint)

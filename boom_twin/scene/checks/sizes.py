@@ -66,14 +66,15 @@ SUSPECTS = (
 
 def suspects(draft: Draft) -> Findings:
     """Check the size of all values of all usable parts."""
-    blocks: list[tuple[Place, Any]] = [(("material",), draft.material), (("base",), draft.base), (("tip",), draft.tip)]
-    blocks += [(("sections", i), section) for i, section in enumerate(draft.sections)]
-    blocks += [(("joints", i), joint) for i, joint in enumerate(draft.joints)]
-    for place, block in [*blocks, (("line_fill",), draft.line_fill)]:
+    scene = draft.scene
+    blocks: list[tuple[Place, Any]] = [((key,), getattr(scene, key)) for key in ("material", "base", "tip", "line_fill")]
+    blocks += [(("sections", i), section) for i, section in enumerate(scene.sections)]
+    blocks += [(("joints", i), joint) for i, joint in enumerate(scene.joints)]
+    for place, block in blocks:
         if block is not None:
             yield from _block(draft, place, block)
     yield from _gravity(draft)
-    for name, angles in draft.postures.items():
+    for name, angles in scene.postures.items():
         if angles and max(map(abs, angles)) < 6.3 and any(angle != round(angle) for angle in angles):
             yield draft.warning(("postures", name), angles, "all within 6.3: radians?", "Give degrees to the horizontal.")
 
@@ -115,16 +116,15 @@ def _narrow(draft: Draft, place: Place, value: tuple[float, float]) -> Findings:
 
 
 def _gravity(draft: Draft) -> Findings:
-    if draft.gravity is not None:
-        wrong = ""
-        if not 9.7 < math.hypot(*draft.gravity) < 9.9:
-            wrong = "its size is not that of the earth's gravity, about 9.81 m/s^2"
-        elif draft.gravity[1] > 0:
-            wrong = "it points upwards"
-        elif abs(draft.gravity[0]) > TILT * abs(draft.gravity[1]):
-            wrong = "it does not point along -y, which is down"
-        if wrong:
-            yield draft.warning(("gravity",), draft.gravity, wrong, "Give [0.0, -9.81]; a slope is base.inclination, rad.")
+    gravity, wrong = draft.scene.gravity, ""
+    if not 9.7 < math.hypot(*gravity) < 9.9:
+        wrong = "its size is not that of the earth's gravity, about 9.81 m/s^2"
+    elif gravity[1] > 0:
+        wrong = "it points upwards"
+    elif abs(gravity[0]) > TILT * abs(gravity[1]):
+        wrong = "it does not point along -y, which is down"
+    if wrong:
+        yield draft.warning(("gravity",), gravity, wrong, "Give [0.0, -9.81]; a slope is base.inclination, rad.")
 
 
 # -- parts against each other -----------------------------------------------------------------------------------------
@@ -231,15 +231,17 @@ def density(scene: Scene) -> float | None:
     return known if _between(stiffness, SPECIFIC_STIFFNESS, known) else None
 
 
-def material(draft: Draft, scene: Scene) -> Findings:
+def material(draft: Draft) -> Findings:
     """Check Young's modulus against the density."""
+    scene = draft.scene
     rho = scene.material.rho
     of_steel = 1.0 if rho is not None and _between(rho, STEEL_RHO) else None
     yield from _judged(draft, MATERIAL, ("material",), E=scene.material.E, rho=rho, of_steel=of_steel)
 
 
-def beams(draft: Draft, scene: Scene) -> Findings:
+def beams(draft: Draft) -> Findings:
     """Check all sections that have a beam."""
+    scene = draft.scene
     rho, before = density(scene), None
     for i, section in enumerate(scene.sections):
         if section.beam is not None and section.A is not None and section.I is not None:
@@ -266,18 +268,20 @@ def _ends(draft: Draft, i: int, length: float, beam: Point) -> Findings:
         yield draft.warning(place, beam, bound, "Give [x0, x1] from the inboard pivot: where the box begins and ends.")
 
 
-def rigid_parts(draft: Draft, scene: Scene) -> Findings:
+def rigid_parts(draft: Draft) -> Findings:
     """Check roots and heads."""
+    scene = draft.scene
     for i, section in enumerate(scene.sections):
         ends = section.beam or (section.length, section.length)
         for key, part, span in (("root", section.root, (0.0, ends[0])), ("head", section.head, (ends[1], section.length))):
             if part is not None and part.mass > 0.0:
-                yield from _part(draft, scene, ("sections", i, key), part, span)
+                yield from _part(draft, ("sections", i, key), part, span)
 
 
-def _part(draft: Draft, scene: Scene, place: tuple[str, int, str], part: RigidPart, span: tuple[float, float]) -> Findings:
+def _part(draft: Draft, place: tuple[str, int, str], part: RigidPart, span: tuple[float, float]) -> Findings:
     """Check centre, inertia and mass: at least that of a share of as much beam, at most that of a solid block of its depth."""
-    section, depth, length = scene.sections[place[1]], scene.sections[place[1]].depth, span[1] - span[0]
+    section, length = draft.scene.sections[place[1]], span[1] - span[0]
+    depth = section.depth
     more = OVERHANG * section.length
     low, high = span[0] - more, span[1] + more
     if not low <= part.com[0] <= high or abs(part.com[1]) > BESIDE * depth:
@@ -289,13 +293,14 @@ def _part(draft: Draft, scene: Scene, place: tuple[str, int, str], part: RigidPa
     own |= {"mass": part.mass, "inertia": part.inertia, "size": math.hypot(length + more, 2.0 * depth)}
     if length > LONG_PART * section.length:
         own["lightest"] = LIGHTEST_PART * (section.rho_A or 0.0) * length
-    if (rho := density(scene)) is not None:
+    if (rho := density(draft.scene)) is not None:
         own["heaviest"] = rho * depth**2 * (length + 2.0 * depth)
     yield from _judged(draft, RIGID_PART, place, **own)
 
 
-def moving_parts(draft: Draft, scene: Scene) -> Findings:
+def moving_parts(draft: Draft) -> Findings:
     """Check links and cylinders."""
+    scene = draft.scene
     for i, (section, joint) in enumerate(zip(scene.sections, scene.joints, strict=True)):
         root = 0.0 if section.root is None else section.root.mass
         per_metre = section.rho_A if section.rho_A is not None else root / section.length

@@ -40,7 +40,7 @@ TAKES = frozenset(
 """Keys on which all of it depends: where one of these is odd, it would be told again."""
 
 
-def whole_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Fault]:
+def whole_boom(draft: Draft, odd: Sequence[str]) -> list[Fault]:
     """Return the first implausibility that only all parts together show.
 
     Payload, pressure, oil, frequency and damping are checked in this order: the first that is irregular causes what follows.
@@ -48,6 +48,7 @@ def whole_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Fault]:
     """
     if any(path.rpartition(".")[2] in TAKES for path in odd):
         return []
+    scene = draft.scene
     found = straight_boom(scene, np.array([middle_stiffness(joint.cylinder) for joint in scene.joints]))
     checks = (_payload, _pressure, _give, _stiff, _frequency, _damping)
     turned = [path.removesuffix("range_deg") for path in odd if path.endswith("range_deg")]  # joints whose levers are no use

@@ -7,13 +7,12 @@ import io
 from pathlib import Path
 
 import pytest
-from default_boom import default_text, examine, with_end_mark
+from default_boom import default_text, examine, examine_text, with_end_mark
 from ruamel.yaml import YAML
 
 from boom_twin import Scene, load_scene
 from boom_twin.reduction.variants import KINDS, variants
 from boom_twin.scene.edit import Edit, edited, rewritten
-from boom_twin.scene.load import parse, structure
 
 EDITS = (
     Edit(("modes",), 4),
@@ -29,9 +28,7 @@ EDITS = (
 
 
 def scene_of(text: str) -> Scene:
-    scene, _, faults = structure(parse(text, "test"))
-    assert scene is not None and not faults
-    return scene
+    return examine_text(text, "test", whole=True)[0]
 
 
 def in_blocks(text: str) -> str:
