@@ -21,7 +21,7 @@ from ruamel.yaml.nodes import ScalarNode
 from ..config.yaml_text import Document, Place, YamlReader, whole_text
 from ..errors import Fault, SceneError, SceneWarning, UsageError
 from .block_reader import NUMBER, validated
-from .checks import Draft, Findings, geometry, linkages, sizes, values, whole_boom
+from .checks import Draft, Findings, geometry, sizes, values, whole_boom
 from .schema import Scene
 
 MAX_BYTES = 4_000_000
@@ -174,7 +174,7 @@ PLAUSIBILITY: tuple[Check, ...] = (
     sizes.beams,
     sizes.rigid_parts,
     sizes.moving_parts,
-    linkages.clear_cylinders,
+    geometry.clear_cylinders,
 )
 """Of a scene without faults: parts against each other."""
 
