@@ -18,7 +18,7 @@ from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..system.summary_display import SummaryDisplay, data_frame, numbers
+from ..system.result_text import SummaryDisplay, data_frame, numbers
 from ..types import Array
 from .doubts import (
     EstimatedError,
@@ -121,7 +121,7 @@ class Simulation(SummaryDisplay):
         return data_frame(self.columns())
 
     def summary_rows(self) -> dict[str, str]:
-        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        """See `boom_twin.system.result_text.SummaryDisplay`."""
         return {
             "rows": f"{len(self.times)}, {self.times[-1] - self.times[0]:.4g} s",
             "tip at the end": f"{numbers(self.tip[-1, :2])} m",

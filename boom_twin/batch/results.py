@@ -22,9 +22,9 @@ from ..plots.session import Trend, trends_picture
 from ..report.fatigue import LIVES, hours_as_text, yearly_as_text
 from ..report.html import Html, heading, image, page, paragraph, table
 from ..system.atomic_files import DRAFT, write_atomic
-from ..system.json_text import json_text
 from ..system.received_files import real_path
 from ..system.result_folder import check_lasting
+from ..system.result_text import json_text
 from ..system.terminal_text import printable
 from ..types import SECOND, sensor_kind
 from .rigs import LEAST_SESSIONS, Drift, RigSummary, as_dict

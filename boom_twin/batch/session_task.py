@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..errors import BoomTwinError
-from ..system.child_process import python_command
+from ..system.processes import python_command
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene

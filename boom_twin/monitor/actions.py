@@ -11,7 +11,7 @@ from typing import Any
 from unicodedata import category
 
 from ..bag.async_writer import PATIENCE
-from ..system.child_process import end_process, python_command
+from ..system.processes import end_process, python_command
 from .data.feed import Feed
 from .data.status import MAX_ALARMS
 

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..system.json_text import json_text
+from ..system.result_text import json_text
 from ..types import SENSORS
 from .data.received_messages import DroppedMessages
 from .data.status import HEALTH, ListedAlarm, Severity, StatusLamp, overall, worst

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..system.child_process import beside
+from ..system.processes import beside
 from ..types import Array
 from .history import History, Truth
 from .posture import posture_picture

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ...errors import BoomTwinError
-from ...system.cores import use_one_blas_thread
+from ...system.processes import use_one_blas_thread
 from ...system.terminal_text import open_closed_streams
 from ..startup import StopSignal, end_with_preparation, require_rclpy
 

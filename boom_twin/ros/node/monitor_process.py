@@ -8,7 +8,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from ...messages.topic_table import NODE, Topics
-from ...system.child_process import end_process, python_command
+from ...system.processes import end_process, python_command
 
 LOOK = 1.0  # seconds of steady time between looks at whether it still runs
 SERVICES = ("acknowledge", "get_parameters", "scene")
