@@ -51,11 +51,6 @@ class Simulation(SummaryDisplay):
         Drives, and lengths of the cylinders pin to pin less `closed_length`, m; rad; N (tension positive).
     tip, tip_velocity, tip_acceleration : ndarray, shape (m, 3)
         x, y, orientation of the last head, in m and rad, and their rates.
-    passes : float
-        Newton passes per step, mean.
-    step_error : float
-        Sum of the errors of all steps in the position of the tip, m: about what stepping may have added to it. One step's is
-        |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991, for Newmark's family).
     step_errors, row_errors : tuple of EstimatedError
         Estimated errors of tip, acceleration and forces, from steps and from what lies between the rows of the drive; empty
         where they were not asked for.
@@ -81,8 +76,6 @@ class Simulation(SummaryDisplay):
     tip: Array
     tip_velocity: Array
     tip_acceleration: Array
-    passes: float
-    step_error: float
     step_errors: tuple[EstimatedError, ...]
     row_errors: tuple[EstimatedError, ...]
     doubts: tuple[str, ...]
@@ -208,7 +201,6 @@ def simulate(
         strokes = drives_of(compile_scene(scene), times, own.rows.lengths, own.rows.cylinder_forces)
     return Simulation(
         times, strokes, own.rows.lengths, own.rows.joints, own.rows.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
-        own.passes, abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * own.jolt,
         by_steps, by_rows, doubts, plan.pins, own.rows.pins, own.lost, own.end,
     )  # fmt: skip
 

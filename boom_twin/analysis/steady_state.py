@@ -13,12 +13,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from ..errors import UsageError
-from ..scene.kinematics import posture_angles, strokes_of_angles
+from ..scene.kinematics import strokes_of_angles
 from ..scene.pump_pulses import CHANGE_OVER, pump_pulses, upward
 from ..scene.schema import Scene
 from ..types import Array, ComplexArray
@@ -223,23 +222,6 @@ def resonance_map(
             found = steady_state_of(boom, load)
             swing[i, j], harmonics[i, j] = found.swing, 1 + int(np.argmax(found.harmonics))
     return ResonanceMap(tuple(postures), np.asarray(rates, float), swing, harmonics)
-
-
-def named_postures(scene: Scene) -> dict[str, Array]:
-    """Joint angles (rad) of all postures of the scene."""
-    return {name: posture_angles(scene, name) for name in scene.postures}
-
-
-def postures_along(scene: Scene, names: list[str], steps: int) -> dict[str, Array]:
-    """Joint angles (rad) along the way from posture to posture, in `steps` even steps of all joints from each to the next."""
-    corners = [posture_angles(scene, name) for name in names]
-    found = {names[0]: corners[0]}
-    for k, (before, after) in enumerate(pairwise(corners)):
-        for step in range(1, steps):
-            share = step / steps
-            found[f"{names[k]} to {names[k + 1]} {100.0 * share:.0f} %"] = before + share * (after - before)
-        found[names[k + 1]] = after
-    return found
 
 
 def _strokes(scene: Scene, name: str, angles: Array) -> Array:
