@@ -18,7 +18,7 @@ from urllib.parse import quote
 
 from .. import __version__
 from ..errors import BagError
-from ..plots.session import Trend, trends_picture
+from ..plots.results import Trend, trends_picture
 from ..report.fatigue import LIVES, hours_as_text, yearly_as_text
 from ..report.html import Html, heading, image, page, paragraph, table
 from ..system.atomic_files import DRAFT, write_atomic

@@ -96,7 +96,7 @@ def _moving(bar: ProgressBar) -> Progress:
 
 def _draw(found: Calibration, out: Path) -> list[Path]:
     from ..calibration.output import picture_paths, shown
-    from ..plots.session import Interval, held_out_picture, parameters_picture
+    from ..plots.results import Interval, held_out_picture, parameters_picture
 
     note = f"held out: {found.held_out}"
     judged = (found.before, found.after)

@@ -80,7 +80,7 @@ def run(args: Namespace) -> int:
 
 
 def _draw(path: Path, scene: Scene, name: str) -> Path:
-    from ..plots.joint_ranges import joint_ranges_picture
+    from ..plots.boom import joint_ranges_picture
 
     return joint_ranges_picture(path, scene, Path(name).name)
 

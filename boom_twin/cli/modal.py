@@ -31,7 +31,7 @@ def run(args: Namespace) -> int:
     from ..calibration.rest_periods import Rigging
     from ..calibration.run import common_mapping, common_reading
     from ..calibration.sessions import read_sessions
-    from ..plots.session import stabilisation_picture
+    from ..plots.results import stabilisation_picture
     from ..report.operational_modes import measured_rests
     from ..system.atomic_files import write_atomic
     from ..system.result_folder import MODAL, result_folder

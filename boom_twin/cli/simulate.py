@@ -52,7 +52,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--start", default="rest", metavar="STATE", help=where)
     parser.add_argument("--joint-rates", metavar="R1,R2,..", help="rates of the joint angles, rad/s, with --start undeflected")
     parser.add_argument("--save-state", metavar="FILE.json", help="the boom at the last row, for --start of another run")
-    parser.add_argument("--orbits", metavar="FILE.png", help="picture of the journals in their bushes, at the drive's rows")
     damping = "numerical damping of the fastest vibrations, as what is left of them after a step: 0 to 1 (default 0.8)"
     parser.add_argument("--rho", type=_share, metavar="RHO", help=damping)
     many = "Monte Carlo: so many booms with parameters drawn at random; OUT.csv has mean, deviation, quantiles"
@@ -73,18 +72,14 @@ def run(args: Namespace) -> int:
     from ..analysis.balances import energy_balance, momentum_balance
     from ..analysis.initial_state import write_state
     from ..analysis.simulate import RHO, course_of, simulate
-    from ..compiler.compile import compile_scene
     from ..scene.edit import with_rigid_cylinders
 
     scene = open_scene(args.scene)
     _check_sampling(args)
-    if args.orbits and not compile_scene(scene).pins:
-        raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
     sources = files_of(args, "drive", "lengths", "force", "scene")
     check_target(Path(args.out), sources, _is_earlier)
-    for picture_or_state in filter(None, (args.orbits, args.save_state)):
-        check_new(Path(picture_or_state), sources)
-    _check_targets({"--out": args.out, "--orbits": args.orbits, "--save-state": args.save_state})
+    if args.save_state:
+        check_new(Path(args.save_state), [*sources, Path(args.out)])
     times, strokes, stem = read_history(sources[0], len(scene.joints), ("length", "stroke") if args.lengths else ("stroke",))
     pushed = None if args.force is None else _columns(read_csv(Path(args.force), UsageError), FORCE_COLUMNS)
     for oddity in odd_in_drive(times, strokes, stem):
@@ -109,23 +104,14 @@ def run(args: Namespace) -> int:
         course = course_of(moving, times, strokes, args.dt, angles, rho, start, force=pushed)
         balances = energy_balance(course, args.dt), momentum_balance(course, args.dt)
     print_result(args.json, as_json(result, args.out, balances), as_text(result, args.out, args.start, balances))
-    if args.orbits:
-        _draw_orbits(args, scene, result)
     return 0
-
-
-def _check_targets(targets: dict[str, str | None]) -> None:
-    seen: dict[Path, str] = {}
-    for option, target in targets.items():
-        if target and seen.setdefault(Path(target).resolve(), option) != option:
-            raise UsageError(f"{option} {target}: {seen[Path(target).resolve()]} writes this file too. Give it another file.")
 
 
 def _check_sampling(args: Namespace) -> None:
     if args.samples is None:
         refuse_given(args, "goes with --samples N. Add it, or leave --vary out.", "vary")
         return
-    single = ["check", "save_state", "orbits", "rho", *(["start"] if args.start != "rest" else [])]
+    single = ["check", "save_state", "rho", *(["start"] if args.start != "rest" else [])]
     refuse_given(args, "is of one motion, --samples of many. Leave one of them out.", *single)
     refuse_given(args, "--samples draws booms that follow drives. Give --drive instead.", "lengths")
 
@@ -227,16 +213,6 @@ def as_text(result: Simulation, out: str, start: str, balances: Balances | None)
     ]
     lines += [f"{name}: contact lost {lost} times" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)]
     return [*lines, *(f"{balance}." for balance in balances or ()), out]
-
-
-def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:
-    from ..compiler.compile import compile_scene
-    from ..plots.history import Orbits
-    from ..plots.posture import orbits_picture
-
-    gaps = compile_scene(scene).tables.clearances.gap
-    orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
-    orbits_picture(Path(args.orbits), f"{Path(args.drive or args.lengths).name}: journals in their bushes", orbits)
 
 
 def _is_earlier(start: bytes) -> bool:

@@ -14,7 +14,7 @@ from ..health.sensor_monitor import noise_as_text
 from ..offline.recording import Recording
 from ..offline.replay import Replay
 from ..plots import AlarmSpan
-from ..plots.health import frequency_picture, moment_picture, timeline_picture
+from ..plots.results import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import DEPTH_BY_GYRATION
 from ..system.atomic_files import write_atomic
 from ..texts import alarm_sentence
