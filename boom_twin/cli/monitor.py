@@ -17,7 +17,7 @@ from .arguments import add_ros_args, add_session, ros_arguments, window_of
 from .output import open_scene, open_session_scene, open_session_settings, tell, warn_incomplete
 
 if TYPE_CHECKING:
-    from ..monitor.data.feed import Feed, SessionList
+    from ..monitor.data.feed import Feed
 
 
 ACTS = ("mark", "acknowledge", "acknowledge-at-node", "record")
@@ -29,7 +29,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--bag",
         metavar="BAG",
         type=Path,
-        help="a recorded session, the bag of a replay, or a folder of several sessions to choose from (the live topics)",
+        help="a recorded session, or the bag of a replay (the live topics)",
     )
     add_session(parser)
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
@@ -57,19 +57,15 @@ def run(args: Namespace) -> int:
     """Serve until Ctrl-C, SIGTERM or the end of the terminal."""
     if find_spec("aiohttp") is None:
         raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
+    from ..monitor.access_control import write_log
     from ..monitor.actions import RecorderProcess, ViewerActions
-    from ..monitor.connections import write_log
 
     _lower_priority()
     write_log()
     recording = RecorderProcess(args.record_into, _passed_on(args)) if "record" in args.allow and args.bag is None else None
     try:
-        if args.bag is not None:
-            with closing(_sessions(args)) as sessions:
-                _serve(args, sessions.feed, ViewerActions(sessions.feed, frozenset(args.allow)), sessions)
-        else:
-            with _live_feed(args) as feed:
-                _serve(args, feed, ViewerActions(feed, frozenset(args.allow), recording))
+        with closing(_bag_feed(args)) if args.bag is not None else _live_feed(args) as feed:
+            _serve(args, feed, ViewerActions(feed, frozenset(args.allow), recording))
     finally:
         if recording is not None:
             recording.close()
@@ -90,19 +86,13 @@ def _lower_priority() -> None:
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
-def _sessions(args: Namespace) -> SessionList:
+def _bag_feed(args: Namespace) -> Feed:
     from ..bag.reader import scan
     from ..monitor.data.bag_feed import bag_feed
-    from ..monitor.data.feed import SessionList, sessions_in
 
-    window = window_of(args)
-
-    def open_feed(path: Path) -> Feed:
-        warn_incomplete(scan(path))
-        scene, settings = open_session_scene(path, args.scene), open_session_settings(path, args.params, args.namespace)
-        return bag_feed(path, scene, settings, args.mapping, window, args.namespace)
-
-    return SessionList(sessions_in(args.bag), open_feed)
+    warn_incomplete(scan(args.bag))
+    scene, settings = open_session_scene(args.bag, args.scene), open_session_settings(args.bag, args.params, args.namespace)
+    return bag_feed(args.bag, scene, settings, args.mapping, window_of(args), args.namespace)
 
 
 @contextmanager
@@ -120,7 +110,7 @@ def _live_feed(args: Namespace) -> Iterator[Feed]:
             yield feed
 
 
-def _serve(args: Namespace, feed: Feed, actions: Any, sessions: SessionList | None = None) -> None:
+def _serve(args: Namespace, feed: Feed, actions: Any) -> None:
     import asyncio
 
     from ..monitor.access_control import AccessControl, token_of
@@ -130,7 +120,7 @@ def _serve(args: Namespace, feed: Feed, actions: Any, sessions: SessionList | No
     access = AccessControl(args.host, "" if args.token_file is None else token_of(args.token_file))
     webhook = None if args.webhook is None else Webhook(args.webhook)
     try:
-        asyncio.run(_run(args, Server(feed, actions, access, sessions, webhook), access))
+        asyncio.run(_run(args, Server(feed, actions, access, webhook), access))
     except OSError as error:
         raise BoomTwinError(f"cannot listen on {args.host}:{args.port}: {error.strerror}. Choose another --port.") from None
 

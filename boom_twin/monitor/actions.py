@@ -82,10 +82,6 @@ class ViewerActions:
             "record": self._record,
         }
 
-    def of(self, feed: Feed) -> ViewerActions:
-        """Return these actions for another feed."""
-        return ViewerActions(feed, self.permitted, self._recording)
-
     @property
     def is_recording(self) -> bool:
         """Return True if a recording started by this monitor is running."""

@@ -22,8 +22,7 @@ from .access_control import AccessControl
 from .actions import ViewerActions
 from .data.bag_feed import TwinView
 from .data.feed import Feed
-from .data.received_messages import text
-from .data.status import Severity
+from .data.status import Severity, text
 from .data.store import Store
 from .server import Server, serving
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from collections.abc import Callable
 from math import inf, isfinite
 from typing import Any
 
@@ -17,7 +16,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from .actions import ViewerActions
 from .data.analyst import Analyst, TipResponses, response_messages
-from .data.feed import Feed, Playback, SessionList
+from .data.feed import Feed, Playback
 from .data.store import Table
 from .protocol import ROWS, alarms, dump, layout, pack, state
 
@@ -32,28 +31,15 @@ MAX_REQUESTS = 40  # largest number of requests of a page in a second
 
 
 class Viewer:
-    """Viewer of one prepared WebSocket.
+    """Viewer of one prepared WebSocket."""
 
-    `choose` opens one of the `sessions` by its index and returns a sentence for the viewer.
-    """
-
-    def __init__(
-        self,
-        socket: web.WebSocketResponse,
-        feed: Feed,
-        actions: ViewerActions,
-        analyst: Analyst,
-        sessions: SessionList | None,
-        choose: Callable[[int], str],
-    ) -> None:
+    def __init__(self, socket: web.WebSocketResponse, feed: Feed, actions: ViewerActions, analyst: Analyst) -> None:
         self._socket, self._feed, self._actions, self._analyst = socket, feed, actions, analyst
-        self._sessions, self._choose = sessions, choose
         self._playback = None if feed.end is None else Playback(feed)
         self._sent: dict[str, int] = {}
         self._generation = -1
         self._tables = 0
         self._alarms = ""
-        self._spectrogram_until = -inf
         self._response: TipResponses | None = None
 
     async def serve(self) -> None:
@@ -75,8 +61,6 @@ class Viewer:
                 "end": feed.end,
                 "permitted": sorted(self._actions.permitted),
                 "history": HISTORY,
-                "sessions": [] if self._sessions is None else self._sessions.names,
-                "session": 0 if self._sessions is None else self._sessions.index,
             }
         )
         last = time.monotonic()
@@ -98,7 +82,7 @@ class Viewer:
     async def _restart_if_cleared(self) -> None:
         store = self._feed.store
         if store.generation != self._generation:
-            self._generation, self._tables, self._sent, self._spectrogram_until = store.generation, 0, {}, -inf
+            self._generation, self._tables, self._sent = store.generation, 0, {}
             await self._send_text({"kind": "reset"})
         if len(store.tables) != self._tables:
             self._tables = len(store.tables)
@@ -154,15 +138,7 @@ class Viewer:
                 lines, block = found
                 await self._send_text(lines)
                 await self._socket.send_bytes(block)
-            await self._send_spectrogram(position)
             await asyncio.sleep(SPECTRUM_PERIOD)
-
-    async def _send_spectrogram(self, position: float) -> None:
-        generation = self._generation
-        found = await self._analyst.spectrogram_between(max(self._spectrogram_until, position - HISTORY), position)
-        if found is not None and generation == self._generation == self._feed.store.generation:
-            self._spectrogram_until, block = found
-            await self._socket.send_bytes(block)
 
     async def _send_responses(self) -> None:
         """Send the response in the posture shown if the page does not have it."""
@@ -203,17 +179,10 @@ class Viewer:
     def _do(self, request: Any) -> dict[str, Any] | None:
         if not isinstance(request, dict):
             raise ValueError("not a request")
-        if request.get("do") == "session":
-            return self._choose_session(request["value"])
         if request.get("do") in ("seek", "speed", "hold"):
             self._control_playback(request["do"], float(request["value"]))
             return None
         return self._actions.act(request)
-
-    def _choose_session(self, index: Any) -> dict[str, Any]:
-        if self._sessions is None or type(index) is not int or not 0 <= index < len(self._sessions.names):
-            raise ValueError("no such session")
-        return {"kind": "answer", "do": "session", "done": True, "words": self._choose(index)}
 
     def _control_playback(self, what: str, value: float) -> None:
         if (play := self._playback) is None or not isfinite(value):

@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from boom_twin.monitor.data.received_messages import DroppedMessages, MalformedError
 from boom_twin.monitor.data.status import MAX_ALARMS, SILENCE, AlarmList, Severity, StatusTable, overall
-from boom_twin.monitor.data.store import Store
+from boom_twin.monitor.data.store import DroppedMessages, MalformedError, Store
 from boom_twin.monitor.protocol import state
 from boom_twin.types import Alarm, Ranked
 

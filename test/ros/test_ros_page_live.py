@@ -97,7 +97,7 @@ def shows_what_was_said(page: Any, witness: Witness) -> None:
     witness.until(lambda: len(witness.rows()) > 100)
     for shown, said in witness.rows():
         assert shown == pytest.approx(said, rel=1e-6)
-    page.keyboard.press("5")
+    page.keyboard.press("4")
 
     def level_of(statuses: dict[str, Any], name: str) -> str:
         return LEVELS[statuses[name].level[0]].name if name in statuses else "unknown"
@@ -119,7 +119,7 @@ def shows_what_was_said(page: Any, witness: Witness) -> None:
         )
 
     witness.until(are_the_lamps)
-    page.keyboard.press("7")  # the response in the posture that the node tells: curves of all loads
+    page.keyboard.press("6")  # the response in the posture that the node tells: curves of all loads
     witness.until(lambda: page.evaluate("twin.response.chart?.plot.data.length === 7"))
     assert page.evaluate("twin.response.chart.plot.data.slice(1, 6).every(row => row.every(v => v > 0))")
     page.keyboard.press("1")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import asdict, dataclass, field
-from math import floor
 from typing import Any
 
 import numpy as np
+from scipy.signal import find_peaks
 
+from ...analysis.even_times import power_density, spacing
 from ...analysis.frequency_response import UPWARD, linearised_boom
 from ...analysis.posture_modes import MOVED, ModeList, PresentPosture
 from ...analysis.resonance_map import TOO_MUCH
@@ -16,9 +17,8 @@ from ...errors import BoomTwinError
 from ...scene.pump_pulses import CHANGE_OVER
 from ...scene.schema import Scene
 from ...types import Array
-from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
+from ..protocol import RESPONSE, SPECTRUM, pack
 from .feed import Feed
-from .spectrum import COLUMN_STEP, SEGMENT, SPECTRUM_SPAN, Peak, spectrogram, spectrum
 from .topic_rows import ESTIMATE
 
 
@@ -91,6 +91,60 @@ def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
     return tuple((float(PUMP_RATES[a]), float(PUMP_RATES[b])) for a, b in zip(starts, stops, strict=True))
 
 
+SPECTRUM_SPAN = 40.0  # time span of the spectrum, up to the shown time, s
+SEGMENT = 8.0  # segment of Welch's method, s (Hann window, half overlapping, mean removed)
+LOWEST_PEAK, HIGHEST_PEAK = 0.3, 30.0  # frequencies of peaks, Hz
+MAX_PEAKS = 5
+PROMINENCE = 6.0  # lowest prominence of a peak, dB
+
+
+@dataclass(frozen=True, slots=True)
+class Peak:
+    """Peak of the spectrum: frequency (Hz), density ((m/s^2)^2/Hz)."""
+
+    frequency: float
+    density: float
+
+
+@dataclass(frozen=True, slots=True)
+class Spectrum:
+    """Spectrum: frequencies (k,) in Hz, one-sided densities (k, c) in (m/s^2)^2/Hz, peaks of their sum by frequency."""
+
+    frequencies: Array
+    densities: Array
+    peaks: tuple[Peak, ...]
+
+
+def spectrum(times: Array, values: Array) -> Spectrum | None:
+    """Return the spectrum of `values` (n, c) in m/s^2 at `times` (n,) in s; None if they last less than one segment."""
+    finite = np.isfinite(values).all(axis=1)
+    times, values = times[finite], values[finite]
+    if len(times) < 32 or times[-1] - times[0] < SEGMENT:
+        return None
+    rate = 1.0 / spacing(times)
+    even = times[0] + np.arange(round((times[-1] - times[0]) * rate) + 1) / rate
+    values = np.stack([np.interp(even, times, column) for column in values.T], axis=1)
+    length = min(round(SEGMENT * rate), len(even))
+    frequencies, densities, _ = power_density(values, 1.0 / rate, length)
+    peaks = tuple(sorted(_peaks(frequencies, densities.sum(axis=1), rate), key=lambda peak: peak.frequency))
+    return Spectrum(frequencies, densities, peaks)
+
+
+def _peaks(frequencies: Array, density: Array, rate: float) -> list[Peak]:
+    """Return the highest prominent peaks. Their frequency is from a parabola through the decibels."""
+    level = 10.0 * np.log10(np.maximum(density, 1e-30))
+    found, _ = find_peaks(level, prominence=PROMINENCE)
+    found = [i for i in found if LOWEST_PEAK <= frequencies[i] <= min(HIGHEST_PEAK, 0.4 * rate)]
+    peaks = []
+    for i in sorted(found, key=lambda place: -level[place])[:MAX_PEAKS]:
+        below, top, above = level[i - 1 : i + 2]
+        bend = below - 2.0 * top + above
+        offset = 0.5 * (below - above) / bend if bend else 0.0
+        frequency = float(frequencies[i] + offset * (frequencies[1] - frequencies[0]))
+        peaks.append(Peak(frequency, float(density[i])))
+    return peaks
+
+
 UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
 UNKNOWN_POSTURE = TipResponses(trouble="the posture is not known yet")
 KNOWN_SHARE = 0.9  # share of the rows of a signal that must have a value
@@ -106,7 +160,6 @@ class Analyst:
         self._responses: ResponseList | None = None
         self._turn, self._response_turn = asyncio.Lock(), asyncio.Lock()
         self._known: tuple[tuple[int, int], tuple[dict[str, Any], bytes]] | None = None
-        self._firsts: dict[int, tuple[float, float]] = {}
 
     async def spectrum_at(self, time: float) -> tuple[dict[str, Any], bytes] | None:
         """Return text message ``lines`` and binary block of the spectrum at `time` (s); None without enough of a signal."""
@@ -128,7 +181,7 @@ class Analyst:
             moved = self._moved(time)
             number = list(store.tables).index(signal.table)
             block = pack(SPECTRUM, number, found.frequencies, found.densities.astype("f4"))
-            peaks = [self._placed(peak, natural, time, moved > MOVED) for peak in found.peaks]
+            peaks = [self._placed(peak, natural if moved <= MOVED else []) for peak in found.peaks]
             lines = {"kind": "lines", "natural": natural, "peaks": peaks, "source": signal.name, "axes": signal.axes}
             self._known = key, ({**lines, "moved": moved if moved > MOVED else 0.0}, block)
             return self._known[1]
@@ -147,20 +200,6 @@ class Analyst:
             self._responses = self._responses or ResponseList(scene)
             return await asyncio.to_thread(self._responses.at, strokes)
 
-    async def spectrogram_between(self, after: float, until: float) -> tuple[float, bytes] | None:
-        """Return time (s) of the newest column of the spectrogram between two times, and the block of all its columns."""
-        signal = self._signal(until := COLUMN_STEP * floor(until / COLUMN_STEP))
-        table = self._feed.store.tables.get(signal.table)
-        if table is None:
-            return None
-        ends = COLUMN_STEP * np.unique(np.ceil(table.rows(table.until(after), table.until(until))[0] / COLUMN_STEP))
-        ends = ends[(ends > max(after, SEGMENT)) & (ends <= until)]  # none in a pause, which may last for days
-        if not len(ends):
-            return None
-        times, values = table.rows(table.until(ends[0] - SEGMENT), table.until(ends[-1]))
-        found = await asyncio.to_thread(spectrogram, times, values[:, signal.columns].astype(float), ends)
-        return float(ends[-1]), pack(SPECTROGRAM, SIGNALS.index(signal), ends, found)
-
     def _signal(self, time: float) -> Signal:
         """Return the best acceleration that has values in the last segment before `time` (s)."""
         for signal in SIGNALS:
@@ -175,19 +214,14 @@ class Analyst:
         strokes = self._feed.strokes_between(time - SPECTRUM_SPAN, time)
         return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
 
-    def _placed(self, peak: Peak, natural: list[float], time: float, has_moved: bool) -> dict[str, Any]:
-        """Return a peak with the number of its mode, its deviation from the model, and its drift since the first look.
-
-        None of these is given if the boom has moved, because its frequencies do not belong to one posture.
-        """
-        told: dict[str, Any] = {**asdict(peak), "mode": None, "deviation": None, "drift": None}
-        mode = int(np.argmin(np.abs(np.array(natural) - peak.frequency))) + 1 if natural and not has_moved else 0
+    @staticmethod
+    def _placed(peak: Peak, natural: list[float]) -> dict[str, Any]:
+        """Return a peak with the number of its mode and its deviation from the model; None without a mode near it."""
+        told: dict[str, Any] = {**asdict(peak), "mode": None, "deviation": None}
+        mode = int(np.argmin(np.abs(np.array(natural) - peak.frequency))) + 1 if natural else 0
         if not mode or abs(natural[mode - 1] - peak.frequency) > MODE_DISTANCE * natural[mode - 1]:
             return told
-        ratio = peak.frequency / natural[mode - 1]
-        if mode not in self._firsts or time < self._firsts[mode][0]:
-            self._firsts[mode] = time, ratio
-        return told | {"mode": mode, "deviation": ratio - 1.0, "drift": ratio / self._firsts[mode][1] - 1.0}
+        return told | {"mode": mode, "deviation": peak.frequency / natural[mode - 1] - 1.0}
 
     def _natural(self, strokes: list[float]) -> list[float]:
         scene = self._feed.scene()

@@ -1,10 +1,10 @@
 // The WebSocket: connected again and again; what comes is handed on.
 
-import { decodeBlocks, RESPONSE, ROWS, SPECTROGRAM, SPECTRUM } from "./protocol.js";
+import { decodeBlocks, RESPONSE, ROWS, SPECTRUM } from "./protocol.js";
 import { Table } from "./table.js";
 
 const RETRY = 1000; // ms
-const EVENTS = { [SPECTRUM]: "spectrum", [SPECTROGRAM]: "spectrogram", [RESPONSE]: "response" };
+const EVENTS = { [SPECTRUM]: "spectrum", [RESPONSE]: "response" };
 
 export class Connection extends EventTarget {
   constructor() {

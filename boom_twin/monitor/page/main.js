@@ -24,7 +24,7 @@ const connection = new Connection(), view = new View(connection), timeline = new
 new Actions(connection, view);
 new Now(connection);
 const spectrum = new SpectrumTab(connection, new HtmlTable("peaks")), response = new ResponseTab(connection);
-const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, spectrogram: spectrum, shape: new Shape(connection, view), path: new Path(connection, view), response, state: null };
+const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, shape: new Shape(connection, view), path: new Path(connection, view), response, state: null };
 let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now(), shown = NaN, pace = 0;
 const delays = []; // s from the newest stamp to the frame after its drawing, live, if the clocks agree
 
@@ -59,12 +59,6 @@ get("window").onchange = event => view.set({ window: Number(event.target.value),
 get("pause").onclick = pause;
 get("language").replaceChildren(...Object.entries(LANGUAGES).map(([name, label]) => new Option(label, name, name === language, name === language)));
 get("language").onchange = event => choose(event.target.value);
-get("sessions").onchange = event => connection.send({ do: "session", value: Number(event.target.value) });
-
-function showSessions({ sessions, session }) {
-  get("sessions").hidden = sessions.length < 2;
-  get("sessions").replaceChildren(...sessions.map((name, i) => new Option(name, i, i === session, i === session)));
-}
 get("all").onclick = () => view.set({ zoom: null });
 get("theme").onclick = () => setTheme(theme() === "dark" ? "light" : "dark");
 
@@ -80,7 +74,6 @@ addEventListener("keydown", event => {
 
 connection.addEventListener("hello", event => {
   get("title").textContent = t(event.detail.title);
-  showSessions(event.detail);
   get("pause").hidden = timeline.isReplay;
   view.set({ end: null, zoom: null });
 });
