@@ -1,148 +1,162 @@
-"""Folder of a batch: a file for every finished row, with which a second call continues, and the final table and page."""
+"""Page and summaries by rig of a batch: hours of work, fatigue damage and life, drift of figures over time."""
 
 from __future__ import annotations
 
-import fcntl
-import json
-import os
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from hashlib import sha256
 from html import escape
-from math import isfinite
+from math import isfinite, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 from urllib.parse import quote
 
-from .. import __version__
-from ..errors import BagError
+import numpy as np
+from scipy.stats import t as student
+
 from ..plots.results import Trend, trends_picture
-from ..report.fatigue import LIVES, hours_as_text, yearly_as_text
+from ..report.fatigue import LIVES, hours_as_text, hours_to_end, yearly_as_text
 from ..report.html import Html, heading, image, page, paragraph, table
-from ..system.atomic_files import DRAFT, write_atomic
+from ..system.atomic_files import write_atomic
 from ..system.json_text import json_text
-from ..system.received_files import real_path
-from ..system.result_folder import check_lasting
-from ..system.terminal_text import printable
 from ..types import SECOND, sensor_kind
-from .rigs import LEAST_SESSIONS, Drift, RigSummary, as_dict
-from .session_task import ALARM, OK, Row
+from .folder import SESSIONS
+from .session_task import OK, Row
 
-MARK, TABLE, RIGS, PAGE = "batch.json", "sessions.parquet", "rigs.json", "batch.html"
-ROWS, SESSIONS = "rows", "sessions"  # folders of the rows, and of the replays
-DIGEST = "row_sha256"  # key of a row's digest in its file, by which a change is detected
-_OWN = frozenset({MARK, TABLE, RIGS, PAGE, ROWS, SESSIONS})
+HOUR, DAY = 3600.0, 86400.0  # s
+DAMAGE = "fatigue_damage_"  # prefix of the columns with the damage of a station
+DRIFTING = ("residual_mean_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
+"""Prefixes of the figures whose drift is computed."""
+LEAST_SESSIONS = 4  # least number of sessions for a drift: a line with two residual degrees of freedom
+CHANCE = 1e-3  # largest p-value of a significant drift, as in `boom_twin.report.compare.SIGNIFICANT`
 
 
-@contextmanager
-def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
-    """Make or reopen the folder of a batch and lock it against other batches.
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """Change of a figure from first to last session, by a line of weighted least squares."""
 
-    None of the sessions to be read may lie in `out`, nor `out` in one of them. BagError if `out` holds anything else, another
-    batch works in it, or it cannot be written.
+    name: str
+    sessions: int
+    days: float
+    first: float  # value of the line at the first session
+    change: float
+    sigma: float  # standard deviation of `change`, at least that from the scatter
+    is_significant: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Life:
+    """Fatigue of a rig's station with the largest damage, summed over sessions."""
+
+    category: float  # detail category, MPa
+    station: str
+    damage: float
+    sigma: float | None  # standard deviation from the scatter of sessions; None below `LEAST_SESSIONS`
+    largest_share: float  # largest share of `damage` by one session
+    sessions: int
+    hours: float  # total of these sessions
+    has_heights: bool  # heights of the sections are in the scene
+    stations: dict[str, float]  # damage of every station
+
+    @property
+    def hours_to_end(self) -> float | None:
+        """Hours of the same work until the damage is 1; None without damage."""
+        return hours_to_end(self.damage, self.hours)
+
+    def hours_a_year(self, years: float) -> float | None:
+        """Return the hours per year of the same work until a damage of 1 in `years`; None without damage."""
+        return None if self.hours_to_end is None else self.hours_to_end / years
+
+
+@dataclass(frozen=True, slots=True)
+class RigSummary:
+    """Summary of one rig. Sessions with equal files count once."""
+
+    rig: str
+    sessions: int
+    repeated: int  # sessions left out, because another one has equal files
+    hours: float
+    alarmed: int  # sessions with alarms
+    causes: dict[str, int]  # sessions in which a cause was named
+    life: Life | None  # None unless fatigue was asked for
+    drifts: list[Drift]
+
+
+def rigs_of(rows: Sequence[Row]) -> list[RigSummary]:
+    """Return a summary of each rig with a finished session, sorted by name."""
+    rigs: dict[str, list[Row]] = {}
+    for row in sorted((row for row in rows if row["status"] == OK), key=lambda row: int(row["first_stamp_ns"])):
+        rigs.setdefault(row["rig"], []).append(row)
+    return [_summary(rig, found) for rig, found in sorted(rigs.items())]
+
+
+def as_dict(rig: RigSummary) -> dict[str, object]:
+    """Return a summary as plain values, including hours to damage 1."""
+    life = rig.life
+    told = None if life is None else {
+        "detail_category_MPa": life.category, "station": life.station, "damage": life.damage, "damage_sigma": life.sigma,
+        "damage_largest_share": life.largest_share, "sessions": life.sessions, "hours": life.hours,
+        "section_heights_given": life.has_heights, "hours_to_damage_1": life.hours_to_end,
+        **{f"hours_a_year_for_{years}_years": life.hours_a_year(years) for years in LIVES},
+        "damage_by_station": life.stations,
+    }  # fmt: skip
+    return {
+        "rig": rig.rig, "sessions": rig.sessions, "repeated": rig.repeated, "hours": rig.hours, "with_alarms": rig.alarmed,
+        "causes": rig.causes, "fatigue": told, "drifts": rig.drifts,
+    }  # fmt: skip
+
+
+def _summary(rig: str, rows: list[Row]) -> RigSummary:
+    once = [*{row["file_sha256"]: row for row in reversed(rows)}.values()][::-1]
+    causes = Counter(cause for row in once for cause in {alarm["cause"] for alarm in row["alarms"]} if cause)
+    names = sorted({name for row in once for name in row if name.startswith(DRIFTING) and not name.endswith("_sigma")})
+    drifts = [drift for name in names if (drift := drift_of(name, once)) is not None]
+    hours, alarmed = sum(row["duration_s"] for row in once) / HOUR, sum(bool(row["alarms"]) for row in once)
+    return RigSummary(rig, len(once), len(rows) - len(once), hours, alarmed, dict(causes.most_common()), _life(once), drifts)
+
+
+def _life(rows: list[Row]) -> Life | None:
+    own = [row for row in rows if any(name.startswith(DAMAGE) for name in row)]
+    if not own:
+        return None
+    names = dict.fromkeys(name for row in own for name in row if name.startswith(DAMAGE))
+    sums = {name: sum(row.get(name, 0.0) for row in own) for name in names}
+    worst = max(sums, key=lambda name: sums[name])
+    damages, hours = np.array([row.get(worst, 0.0) for row in own]), np.array([row["duration_s"] / HOUR for row in own])
+    total, count, sigma = sums[worst], len(own), None
+    if count >= LEAST_SESSIONS:  # ratio estimate: scatter about the mean damage per hour
+        sigma = float(np.sqrt(count / (count - 1) * np.sum((damages - total / hours.sum() * hours) ** 2)))
+    share, has_heights = damages.max() / total if total > 0.0 else 0.0, all(row["section_heights_given"] for row in own)
+    stations = {name.removeprefix(DAMAGE): value for name, value in sums.items()}
+    category, station = own[0]["fatigue_category_MPa"], worst.removeprefix(DAMAGE)
+    return Life(category, station, total, sigma, float(share), count, float(hours.sum()), has_heights, stations)
+
+
+def drift_of(name: str, rows: Sequence[Row]) -> Drift | None:
+    """Return the drift of a figure over sessions, or None if there are too few.
+
+    A least-squares line is fitted, weighted by the figure's standard deviations. The standard deviation of its slope is
+    enlarged if the scatter about the line is larger. Student's t tests the slope.
     """
-    check_lasting(out)
-    place = real_path(out)
-    for session in sessions:
-        path = Path(os.path.realpath(session))
-        if path == place or place in path.parents or path in place.parents:
-            raise BagError(f"{out}: {session} lies in it, or it in the session, and a source is never touched. Choose another.")
-    try:
-        others = sorted({each.name for each in place.iterdir()} - _OWN) if place.exists() else []
-        is_new = not (place / MARK).is_file()
-        if (is_new and place.exists() and any(place.iterdir())) or any(not name.endswith(DRAFT) for name in others):
-            raise BagError(f"{out}: holds {(others or ['results'])[0]}, which no batch left. Choose a new folder.")
-        for folder in (place / ROWS, place / SESSIONS):
-            folder.mkdir(parents=True, exist_ok=True)
-        lock = os.open(place / MARK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
-    except OSError as error:
-        raise BagError(f"{out}: cannot be written ({error.strerror}). Choose a folder that can.") from None
-    try:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise BagError(f"{out}: another `boom_twin batch` is at work there. Wait for its end, or choose another.") from None
-        yield BatchFolder(place, lock)
-    finally:
-        os.close(lock)
+    known = [row for row in rows if _is_number(row.get(name)) and _is_number(row.get(f"{name}_sigma"))]
+    found = np.array([(row["first_stamp_ns"] / SECOND / DAY, row[name], row[f"{name}_sigma"]) for row in known]).reshape(-1, 3)
+    days, values, sigmas = found[found[:, 2] > 0.0].T
+    if len(days) < LEAST_SESSIONS or not np.ptp(days) > 0.0:
+        return None
+    weights = sigmas**-2.0
+    away = days - weights @ days / weights.sum()
+    mean, size = float(weights @ values / weights.sum()), float(weights @ away**2)
+    slope, freedom = float(weights @ (away * (values - mean))) / size, len(days) - 2
+    scatter = float(weights @ (values - mean - slope * away) ** 2) / freedom
+    sigma = sqrt(max(1.0, scatter) / size)
+    chance = 2.0 * float(student.sf(abs(slope) / sigma, freedom))
+    span = float(np.ptp(days))
+    return Drift(name, len(days), span, mean + slope * float(away.min()), slope * span, sigma * span, chance < CHANCE)
 
 
-class BatchFolder:
-    """Rows and replays of a batch in its folder; see `batch_folder`."""
-
-    def __init__(self, folder: Path, lock: int) -> None:
-        self.folder, self._lock = folder, lock
-
-    def replay(self, key: str) -> Path:
-        """Return the folder of the replay of a session."""
-        return self.folder / SESSIONS / key
-
-    def kept(self, key: str, fingerprint: str) -> Row | None:
-        """Return the row of a session if it is finished and its `fingerprint` is equal; None otherwise.
-
-        BagError if the file was changed since `keep` wrote it.
-        """
-        file = self.folder / ROWS / f"{key}.json"
-        try:
-            row = json.loads(file.read_bytes())
-            if row.pop(DIGEST) != _digest(row):
-                raise ValueError("changed")
-        except FileNotFoundError:
-            return None
-        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
-            raise BagError(f"{file}: this row of an earlier call is damaged. Its session is done anew.") from None
-        return dict(row) if row["fingerprint"] == fingerprint else None
-
-    def keep(self, row: Row) -> None:
-        """Write a finished row to its file."""
-        write_atomic(self.folder / ROWS / f"{row['key']}.json", json.dumps(row | {DIGEST: _digest(row)}) + "\n")
-
-    def mark(self, total: int, finished: int) -> None:
-        """Write the number of finished sessions and the state of the batch."""
-        state = "complete" if finished == total else "unfinished: the same command goes on with it"
-        told = {"command": "batch", "version": __version__, "sessions": total, "finished": finished, "state": state}
-        os.truncate(self._lock, 0)
-        os.pwrite(self._lock, (json.dumps(told) + "\n").encode(), 0)
-
-
-def _digest(row: Row) -> str:
-    return sha256(json.dumps(row).encode()).hexdigest()
-
-
-_ALWAYS: dict[str, str] = {
-    "session": "string", "path": "string", "rig": "string", "status": "string", "reason": "string", "attempts": "int64",
-    "first_stamp_ns": "int64", "duration_s": "double", "samples": "int64", "dropped": "int64", "outside_validity": "int64",
-    "wall_s": "double", "realtime_factor": "double", "peak_memory_bytes": "int64", "tip_acceleration_max_m_s2": "double",
-    "joint_residual_rms_rad": "list", "joint_residual_normalised_mean": "list", "joint_residual_normalised_std": "list",
-    "session_incomplete": "string", "file_sha256": "string", "output_sha256": "string", "scene": "string",
-    "scene_sha256": "string", "mapping": "string", "version": "string", "fingerprint": "string",
-    "key": "string", "report": "bool", "section_heights_given": "bool", "calibration_reason": "string",
-    "calibration_remarks": "string",
-}  # fmt: skip
-"""Columns that every table has, with their types; the others are the figures of `boom_twin.report.quantities`, numbers."""
-
-
-def write_table(path: Path, rows: Sequence[Row]) -> None:
-    """Write all rows as Parquet, one for each session. A column that a row lacks is null there."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    alarm = pa.struct([(name, pa.float64() if name.endswith("_s") else pa.string()) for name in ALARM])
-    types: dict[str, Any] = {
-        **{name: pa.list_(pa.float64()) if kind == "list" else pa.type_for_alias(kind) for name, kind in _ALWAYS.items()},
-        "alarms": pa.list_(alarm),
-        "events": pa.list_(pa.struct([("event", pa.string()), ("count", pa.int64())])),
-    }
-    rows = [{name: printable(value) if isinstance(value, str) else value for name, value in row.items()} for row in rows]
-    figures = sorted({name for row in rows for name in row} - types.keys())
-    words = {name for row in rows for name, value in row.items() if isinstance(value, str)}
-    types |= {name: pa.string() if name in words else pa.float64() for name in figures}
-    columns = [pa.array([row.get(name) for row in rows], kind) for name, kind in types.items()]
-    sink = pa.BufferOutputStream()
-    pq.write_table(pa.table(columns, schema=pa.schema(list(types.items()))), sink)
-    write_atomic(path, sink.getvalue().to_pybytes())
+def _is_number(value: object) -> bool:
+    return isinstance(value, float | int) and isfinite(value)
 
 
 def write_rigs(path: Path, rigs: Sequence[RigSummary]) -> None:

@@ -30,9 +30,17 @@ FILE_NAME = "report.html"
 HOUR = 3600.0  # s
 NO_JUDGE = "The rig's health was not judged."
 ASSUMED = (
-    f"Heights are not in the scene: assumed are {DEPTH_BY_GYRATION:g} radii of gyration, as of thin-walled boxes; "
-    "see --section-height."
+    f"Heights are not in the scene: assumed are {DEPTH_BY_GYRATION:g} radii of gyration, as of thin-walled boxes. "
+    "Give `height` in the sections of the scene."
 )
+
+
+def _name(found: Evaluation) -> str:
+    return found.result.session.path.resolve().name
+
+
+def _origin(found: Evaluation) -> str:
+    return found.result.session.notes.get("origin", "")
 
 
 def write_report(found: Evaluation, folder: Path) -> Path:
@@ -49,7 +57,7 @@ def write_report(found: Evaluation, folder: Path) -> Path:
         *_provenance(found),
     ]
     path = folder / FILE_NAME
-    write_atomic(path, page(f"Session {found.name}", parts))
+    write_atomic(path, page(f"Session {_name(found)}", parts))
     return path
 
 
@@ -73,10 +81,10 @@ def _head(found: Evaluation) -> list[str]:
     ]
     scene = f"{summary['scene']}: {len(found.scene.sections)} sections. {found.scene.description}".strip()
     return [
-        heading(f"Session {found.name}", 1),
+        heading(f"Session {_name(found)}", 1),
         *_verdict(found.result),
         *_worst_stations(found),
-        paragraph(found.origin or "The session does not say where it comes from.", "origin"),
+        paragraph(_origin(found) or "The session does not say where it comes from.", "origin"),
         paragraph(f"Scene {scene}"),
         table((), rows),
         heading("Joint angles", 3),
@@ -152,7 +160,7 @@ def _alarm_times(found: Evaluation, folder: Path) -> list[str]:
     gaps = [AlarmSpan(recording.reads.stream.value, start, stop, "gap") for start, stop in history.gaps]
     spans = sorted([*gaps, *history.alarms], key=lambda alarm: alarm.start)
     path, end = folder / "timeline.png", float(history.stamps_s[-1])
-    timeline_picture(path, found.name, end, spans, found.origin)
+    timeline_picture(path, _name(found), end, spans, _origin(found))
     return [heading("Alarms over time"), image(path, "alarms over time")]
 
 
@@ -179,7 +187,7 @@ def _residuals(folder: Path) -> list[str]:
 def _vibration(found: Evaluation, folder: Path) -> list[str]:
     peaks = [(0.5 * (rest.start + rest.stop), each.frequency) for rest in found.rests for each in rest.measured.values()]
     path = folder / "frequencies.png"
-    frequency_picture(path, found.name, *course(found.history, found.scene), peaks, found.origin)
+    frequency_picture(path, _name(found), *course(found.history, found.scene), peaks, _origin(found))
     source = SENSORS[Stream.ANGLES if found.history.imu is None else Stream.IMU].title
     told = (
         "Lines: the model, about the equilibrium in the posture of the moment. "
@@ -229,7 +237,7 @@ def _moments(found: Evaluation, folder: Path) -> list[str]:
         return [title, paragraph("All sections of the scene are rigid: their bending is not in the model.")]
     path = folder / "moments.png"
     worst = {load.station.section: (load.station.name, load.column) for load in reversed(found.loads)}
-    moment_picture(path, found.name, found.history, [worst[section] for section in sorted(worst)], found.origin)
+    moment_picture(path, _name(found), found.history, [worst[section] for section in sorted(worst)], _origin(found))
     told = (
         "Moments are those of the model's bending coordinates (EI times curvature), static and dynamic together, at the ends "
         "and middles of the flexible parts; positive ones bend the outboard end up. Stress is M / W with W = 2 I / h, of "
@@ -237,7 +245,7 @@ def _moments(found: Evaluation, folder: Path) -> list[str]:
         "static share, with the standard deviation of that share. VIBRATION THAT SUCH A LOAD EXCITES IS IN NEITHER: under a "
         "pump it can be several times as much; `boom_twin response --pump` tells it. "
     )
-    told += "Heights as given." if found.has_heights else ASSUMED
+    told += "Heights as in the scene." if found.has_heights else ASSUMED
     head = (
         "station", "largest moment, kN m", "at, s", "static part then, kN m", "by unknown load, kN m", "W, cm³", "stress, MPa",
     )  # fmt: skip
