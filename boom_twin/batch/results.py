@@ -6,18 +6,18 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from html import escape
 from math import isfinite, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import quote
 
 import numpy as np
+from markupsafe import Markup
 from scipy.stats import t as student
 
 from ..plots.results import Trend, trends_picture
 from ..report.fatigue import LIVES, hours_as_text, hours_to_end, yearly_as_text
-from ..report.html import Html, heading, image, page, paragraph, table
+from ..report.html import render
 from ..system.atomic_files import write_atomic
 from ..system.json_text import json_text
 from ..types import SECOND, sensor_kind
@@ -170,22 +170,6 @@ def counts(rows: Sequence[Row]) -> tuple[int, int]:
     return right, len(rows) - right
 
 
-SORT = """<script>
-const compared = (a, b) => isNaN(a) || isNaN(b) ? a.localeCompare(b) : a - b;
-document.querySelectorAll('.sorted th').forEach((head, column) => head.onclick = () => {
-  const body = head.closest('table').tBodies[0], way = head.dataset.way === '1' ? -1 : 1;
-  const text = row => row.cells[column].textContent;
-  head.dataset.way = way;
-  const order = (a, b) => a === '-' || b === '-' ? (a === '-') - (b === '-') : way * compared(a, b);
-  [...body.rows].sort((one, other) => order(text(one), text(other))).forEach(row => body.append(row));
-});
-</script>
-<style>
-body { max-width: 1400px } .sorted, .wide { overflow-x: auto } .sorted th { cursor: pointer }
-tr:has(.alarm) td { background: #fff0e6 }
-.sorted td { white-space: nowrap } .sorted td:last-child { white-space: normal; min-width: 8em }
-@media (max-width: 1300px) { .sorted table { font-size: 13px } .sorted th, .sorted td { padding: .22em .4em } }
-</style>"""
 COLUMNS = (
     "session", "rig", "begin", "state", "duration, s", "times real time", "alarms", "causes",
     "worst residual / expected", "lowest mode / model", "tip, m/s² at most", "left out", "reason",
@@ -198,29 +182,37 @@ MAX_TRENDS = 24
 def write_page(path: Path, rows: Sequence[Row], rigs: Sequence[RigSummary]) -> None:
     """Write the page beside the folder of the replays. The page loads nothing from other files."""
     right, wrong = counts(rows)
-    alarmed = sum(bool(row.get("alarms")) for row in rows)
-    parts = [
-        heading(f"Batch of {len(rows)} sessions", 1),
-        paragraph(f"{right} right, of which {alarmed} with alarms; {wrong} failed.", "alarm" if wrong or alarmed else "well"),
-        *_by_rig(rigs),
-        heading("Sessions"),
-        paragraph("A click on a column's title sorts by it. All figures are in sessions.parquet.", "note"),
-        f'<div class="sorted">{table(COLUMNS, map(_cells, rows))}</div>',
-        *_trends(rows, rigs),
-        SORT,
-    ]
-    write_atomic(path, page("Batch of sessions", parts))
+    lives = [rig.life for rig in rigs if rig.life is not None]
+    with TemporaryDirectory() as folder:
+        text = render(
+            "batch.html",
+            title="Batch of sessions",
+            right=right,
+            wrong=wrong,
+            alarmed=sum(bool(row.get("alarms")) for row in rows),
+            rig_head=RIG_COLUMNS,
+            rigs=map(_rig_cells, rigs),
+            category=f"{lives[0].category:g}" if lives else None,
+            has_heights=all(life.has_heights for life in lives),
+            least=LEAST_SESSIONS,
+            repeated=sum(rig.repeated for rig in rigs),
+            head=COLUMNS,
+            sessions=list(map(_cells, rows)),
+            trends=list(_trends(rows, rigs, Path(folder))),
+        )
+    write_atomic(path, text)
 
 
 def _cells(row: Row) -> tuple[object, ...]:
     name, is_right, begin = str(row["session"]), row["status"] == OK, row.get("first_stamp_ns")
+    link = Markup('<a href="{}">{}</a>').format(f"{SESSIONS}/{quote(row['key'])}/report.html", name)
     alarms = row.get("alarms") or []
     deviations = [value for value in row.get("joint_residual_normalised_std") or [] if value is not None]
     return (
-        Html(f'<a href="{SESSIONS}/{quote(row["key"])}/report.html">{escape(name)}</a>') if row.get("report") else name,
+        link if row.get("report") else name,
         row.get("rig"),
         None if begin is None else str(datetime.fromtimestamp(begin // SECOND, UTC).replace(tzinfo=None)),
-        OK if is_right else Html(f'<span class="alarm">{escape(row["status"])}</span>'),
+        OK if is_right else Markup('<span class="alarm">{}</span>').format(row["status"]),
         row.get("duration_s"),
         row.get("realtime_factor"),
         len(alarms) if is_right else None,
@@ -237,25 +229,6 @@ RIG_COLUMNS = (
     "rig", "sessions", "hours", "with alarms", "causes named (sessions)", "damage", "at station", "by one session, %",
     "hours of such work to damage 1", *(f"h a year for {years} years" for years in LIVES),
 )  # fmt: skip
-DAMAGE_NOTE = (
-    "Damage (Palmgren and Miner) is the sum of the sessions at the station where it is largest, by the predicted bending "
-    "stress for detail category {category:g} MPa of EN 1993-1-9, without partial factors. Hours are of work as in these "
-    "sessions. Work of other kinds, and vibration that only sensors show, such as by a pump, are NOT in it. "
-)
-ASSUMED = "Section heights are not in every scene: stresses are those of thin-walled boxes there. "
-
-
-def _by_rig(rigs: Sequence[RigSummary]) -> Iterator[str]:
-    yield heading("Rigs")
-    yield f'<div class="wide">{table(RIG_COLUMNS, map(_rig_cells, rigs))}</div>'
-    lives = [rig.life for rig in rigs if rig.life is not None]
-    if not lives:
-        yield paragraph("Damage is not known: give --fatigue, and sections that bend.", "note")
-    else:
-        told = DAMAGE_NOTE.format(category=lives[0].category) + ("" if all(life.has_heights for life in lives) else ASSUMED)
-        yield paragraph(told + f"± is the scatter of the sessions, not known below {LEAST_SESSIONS} of them.", "note")
-    if repeated := sum(rig.repeated for rig in rigs):
-        yield paragraph(f"Counted once: {repeated} sessions whose files equal those of another one.", "note")
 
 
 def _rig_cells(rig: RigSummary) -> tuple[object, ...]:
@@ -269,27 +242,10 @@ def _rig_cells(rig: RigSummary) -> tuple[object, ...]:
     return *start, damage, place, 100.0 * life.largest_share, hours_as_text(life.hours_to_end), *years
 
 
-DRIFT_NOTE = (
-    f"Change from the first session to the last, along a line of weighted least squares. It needs {LEAST_SESSIONS} sessions "
-    "with a standard deviation. DRIFTS: by chance less than once in a thousand. Other postures, loads and temperatures change "
-    "figures, too."
-)
-
-
-def _drifts(rig: RigSummary) -> Iterator[str]:
-    if not rig.drifts:
-        yield paragraph(f"Drift is not known: fewer than {LEAST_SESSIONS} sessions have one figure at different times.", "note")
-        return
-    rows = [
-        (_with_unit(each.name), each.sessions, each.days, each.first, f"{each.change:+.3g} ± {each.sigma:.1g}", _verdict(each))
-        for each in sorted(rig.drifts, key=lambda drift: not drift.is_significant)
-    ]
-    yield paragraph(DRIFT_NOTE, "note")
-    yield table(("figure", "sessions", "days", "at first", "change", "verdict"), rows)
-
-
-def _verdict(drift: Drift) -> object:
-    return Html('<span class="alarm">DRIFTS</span>') if drift.is_significant else "may be chance"
+def _drift_cells(drift: Drift) -> tuple[object, ...]:
+    verdict = Markup('<span class="alarm">DRIFTS</span>') if drift.is_significant else "may be chance"
+    change = f"{drift.change:+.3g} ± {drift.sigma:.1g}"
+    return _with_unit(drift.name), drift.sessions, drift.days, drift.first, change, verdict
 
 
 def _with_unit(name: str) -> str:
@@ -298,25 +254,23 @@ def _with_unit(name: str) -> str:
     return name if channel == name else f"{name}, {sensor_kind(channel).unit}"
 
 
-def _trends(rows: Sequence[Row], summaries: Sequence[RigSummary]) -> Iterator[str]:
-    """Yield drift and pictures of wear-related figures over time, for every rig with several sessions."""
+def _trends(rows: Sequence[Row], summaries: Sequence[RigSummary], folder: Path) -> Iterator[dict[str, object]]:
+    """Yield name, drifts and picture in `folder` of wear-related figures over time, for every rig with several sessions."""
     by_name = {rig.rig: rig for rig in summaries}
     rigs: dict[str, list[Row]] = {}
     for row in rows:
         if row["status"] == OK:
             rigs.setdefault(row["rig"], []).append(row)
-    for rig, found in sorted(rigs.items()):
+    for number, (rig, found) in enumerate(sorted(rigs.items())):
         found.sort(key=lambda row: int(row["first_stamp_ns"]))
         names = sorted({name for row in found for name in row if name.startswith(TRENDS) and not name.endswith("_sigma")})
         trends = [trend for name in names if len((trend := _trend(name, found)).values) > 1][:MAX_TRENDS]
         if trends:
-            yield heading(f"Over time: {rig}")
-            yield from _drifts(by_name[rig])
-            yield paragraph("Sessions by the stamp of their first prediction; bars are standard deviations.", "note")
-            with TemporaryDirectory() as folder:
-                picture = Path(folder) / "trends.png"
-                trends_picture(picture, rig, trends)
-                yield image(picture, "; ".join(trend.label for trend in trends))
+            picture = folder / f"{number}.png"
+            trends_picture(picture, rig, trends)
+            drifts = sorted(by_name[rig].drifts, key=lambda drift: not drift.is_significant)
+            labels = "; ".join(trend.label for trend in trends)
+            yield {"name": rig, "drifts": list(map(_drift_cells, drifts)), "picture": picture, "labels": labels}
 
 
 def _trend(name: str, rows: Sequence[Row]) -> Trend:
