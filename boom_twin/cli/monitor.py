@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..monitor.data.feed import Feed
 
 
-ACTS = ("mark", "acknowledge", "acknowledge-at-node", "record")
+ACTS = ("mark", "acknowledge")
 NICE = 5  # nice value of the monitor, by which it gives way to the node on the same machine
 
 
@@ -39,16 +39,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--webhook", metavar="URL", help="post a JSON object here when an alarm begins, changes its cause, or ends"
     )
-    parser.add_argument(
-        "--allow",
-        nargs="*",
-        choices=ACTS,
-        default=["mark", "acknowledge"],
-        metavar="ACT",
-        help="what viewers may do: mark events, acknowledge alarms (acknowledge-at-node: the node, too, lets go of those that "
-        "ended), start and stop a record(ing) (mark acknowledge)",
-    )
-    parser.add_argument("--record-into", metavar="DIR", type=Path, default=Path("bags"), help="where recordings go (bags)")
+    allow = "what viewers may do: mark events, acknowledge alarms (both)"
+    parser.add_argument("--allow", nargs="*", choices=ACTS, default=ACTS, metavar="ACT", help=allow)
     parser.add_argument("--until-stdin-ends", action="store_true", help=SUPPRESS)  # it ends with the node that started it
     add_ros_args(parser)
 
@@ -58,25 +50,13 @@ def run(args: Namespace) -> int:
     if find_spec("aiohttp") is None:
         raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
     from ..monitor.access_control import write_log
-    from ..monitor.actions import RecorderProcess, ViewerActions
+    from ..monitor.viewer import ViewerActions
 
     _lower_priority()
     write_log()
-    recording = RecorderProcess(args.record_into, _passed_on(args)) if "record" in args.allow and args.bag is None else None
-    try:
-        with closing(_bag_feed(args)) if args.bag is not None else _live_feed(args) as feed:
-            _serve(args, feed, ViewerActions(feed, frozenset(args.allow), recording))
-    finally:
-        if recording is not None:
-            recording.close()
+    with closing(_bag_feed(args)) if args.bag is not None else _live_feed(args) as feed:
+        _serve(args, feed, ViewerActions(feed, args.allow))
     return 0
-
-
-def _passed_on(args: Namespace) -> list[str]:
-    """Return the options that this command passes on to `boom_twin record`."""
-    options = {"--scene": args.scene, "--mapping": args.mapping, "--params": args.params}
-    given = [part for option, value in options.items() if value for part in (option, str(value))]
-    return [*given, *ros_arguments(args)]
 
 
 def _lower_priority() -> None:

@@ -15,11 +15,10 @@ from ..errors import UsageError
 from ..texts import FILE as TEXTS
 from . import PORT
 from .access_control import POLICY, AccessControl, Connection, Connections, in_address
-from .actions import ViewerActions
 from .data.analyst import Analyst
 from .data.feed import Feed
 from .metrics import Metrics
-from .viewer import Viewer
+from .viewer import Viewer, ViewerActions
 from .webhook import AlarmWatch, Webhook
 
 PAGE = Path(__file__).parent / "page"

@@ -1,4 +1,4 @@
-"""Viewer of the live page: messages sent to it, and its requests.
+"""Viewer of the live page: messages sent to it, its requests, and what it may do.
 
 No message is queued. The rows to send follow from the numbers of the rows already sent. Lamps and alarms are sent in their
 present state. A slow page loses rows, but no state of the lamps.
@@ -9,14 +9,16 @@ from __future__ import annotations
 import asyncio
 import json
 import time
+from collections.abc import Collection
 from math import inf, isfinite
 from typing import Any
+from unicodedata import category
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from .actions import ViewerActions
 from .data.analyst import Analyst, TipResponses, response_messages
 from .data.feed import Feed, Playback
+from .data.status import MAX_ALARMS
 from .data.store import Table
 from .protocol import ROWS, alarms, dump, layout, pack, state
 
@@ -28,6 +30,43 @@ BEHIND = 5.0  # largest delay (s) of a page; beyond it, older rows are skipped
 HISTORY = 600.0  # seconds of data that a page gets when it opens or seeks
 NEWEST_ROW_ONLY = "shape"  # table of which only the newest row is sent
 MAX_REQUESTS = 40  # largest number of requests of a page in a second
+
+
+NOTE_LENGTH = 500  # largest number of characters of a note
+NO_TEXT = ("Cc", "Cs")  # unicode categories that cannot be published: control characters and surrogates
+ACTS = ("mark", "acknowledge")
+
+
+class ViewerActions:
+    """Actions of viewers: those of `ACTS` that are permitted at start. A recording takes no marks."""
+
+    def __init__(self, feed: Feed, permitted: Collection[str]) -> None:
+        self._feed = feed
+        self.permitted = frozenset(permitted) - (frozenset() if feed.end is None else {"mark"})
+        self._acts = {"mark": self._mark, "acknowledge": self._acknowledge}
+
+    def act(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Carry out a request and return the answer; raise ValueError if it is unknown."""
+        name = request.get("do")
+        if name not in self._acts:
+            raise ValueError("unknown request")
+        if name not in self.permitted:
+            return {"kind": "answer", "do": name, "done": False, "words": "not permitted when the monitor was started"}
+        return {"kind": "answer", "do": name, "done": True, "words": self._acts[name](request)}
+
+    def _mark(self, request: dict[str, Any]) -> str:
+        note = request.get("note")
+        if not isinstance(note, str) or len(note) > NOTE_LENGTH or any(category(sign) in NO_TEXT for sign in note):
+            raise ValueError(f"a note is a text of at most {NOTE_LENGTH} characters, none of them a control character")
+        self._feed.publish(f"mark: {note}")
+        return f"marked: {note}"
+
+    def _acknowledge(self, request: dict[str, Any]) -> str:
+        known = (self._feed.store.alarms.acknowledge(int(number)) for number in request["numbers"][:MAX_ALARMS])
+        found = [alarm for alarm in known if alarm is not None]
+        for alarm in found if self._feed.end is None else []:
+            self._feed.publish(f"acknowledged: {alarm.name}: {alarm.reason}")
+        return f"acknowledged: {', '.join(alarm.name for alarm in found)}" if found else "that alarm is not kept any more"
 
 
 class Viewer:
@@ -95,7 +134,7 @@ class Viewer:
         if play is not None:
             message |= {"position": play.position, "speed": play.speed, "is_held": play.is_held}
             message |= {"end": feed.end, "read": feed.store.newest}
-        message |= {"trouble": feed.trouble, "phase": feed.phase, "is_recording": self._actions.is_recording}
+        message |= {"trouble": feed.trouble, "phase": feed.phase}
         await self._send_text(message)
         told = dump(alarms(feed.store.alarms.all))
         if told != self._alarms:

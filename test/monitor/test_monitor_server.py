@@ -19,10 +19,10 @@ from ros_messages import load_topics
 
 from boom_twin import load_scene
 from boom_twin.monitor.access_control import AccessControl
-from boom_twin.monitor.actions import ViewerActions
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.server import Server
+from boom_twin.monitor.viewer import ViewerActions
 
 Talk = Callable[[ClientSession, str], Awaitable[None]]
 
@@ -204,7 +204,7 @@ async def ask(url: str, path: str, header: str = "X: y") -> str:
 async def test_nothing_is_done_that_was_not_permitted(feed: Made, session: ClientSession, url: str) -> None:
     async with connect(session, url) as socket:
         assert (await until(socket, "hello"))["permitted"] == []
-        for request in ({"do": "mark", "note": "x"}, {"do": "record", "on": True}, {"do": "acknowledge", "numbers": [1]}):
+        for request in ({"do": "mark", "note": "x"}, {"do": "acknowledge", "numbers": [1]}):
             await socket.send_json(request)
             assert not (await until(socket, "answer"))["done"]
     assert feed.published == []

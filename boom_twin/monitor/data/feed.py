@@ -46,10 +46,6 @@ class Feed:
         """Publish an event, so that a recording of the session holds it."""
         raise NotImplementedError
 
-    def release_alarms(self) -> str:
-        """Ask the node to release alarms that have ended; return in words if it could be asked."""
-        raise NotImplementedError
-
     def close(self) -> None:
         """Release all resources of the feed."""
 

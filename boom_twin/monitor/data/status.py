@@ -269,11 +269,6 @@ class AlarmList:
             alarm.is_acknowledged = True
         return alarm
 
-    def acknowledge_ended(self) -> None:
-        """Acknowledge all ended health alarms, because the node has released them."""
-        for alarm in self.all:
-            alarm.is_acknowledged |= bool(alarm.causes) and alarm.end is not None
-
 
 def _words(channel: str, kind: str, cause: str | None) -> dict[str, str]:
     return {language: text(alarm_text(channel, kind, cause, language)) for language in LANGUAGES}
