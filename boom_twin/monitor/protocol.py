@@ -5,18 +5,16 @@ A binary message is a sequence of blocks. A block has a multiple of 8 bytes. Num
 ======  =====================  ========================================================================================
 offset  type                   meaning
 ======  =====================  ========================================================================================
-0       uint8                  kind: 1 = rows of a table, 2 = spectrum, 3 = response
-1       uint8                  kinds 1, 2: index of the table in the newest ``layout`` message; kind 3: 0
+0       uint8                  kind: 1 = rows of a table, 2 = spectrum
+1       uint8                  index of the table in the newest ``layout`` message
 2       uint16                 columns, c
 4       uint32                 rows, k
-8       float64 x k            kind 1: seconds since the session's epoch; kinds 2, 3: frequencies, Hz
+8       float64 x k            kind 1: seconds since the session's epoch; kind 2: frequencies, Hz
 8 + 8k  float32 x k x c        values column by column, then zeros up to a multiple of 8 bytes
 ======  =====================  ========================================================================================
 
-A spectrum has two columns: the directions named by the message ``lines`` before it. A response has one for each load named by
-the message ``loads`` before it.
-Text messages are JSON with a key ``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``loads``,
-``answer``.
+A spectrum has two columns: the directions named by the message ``lines`` before it. Text messages are JSON with a key ``kind``:
+``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``rates``, ``answer``.
 """
 
 from __future__ import annotations
@@ -34,7 +32,7 @@ from .data.status import HEALTH, ListedAlarm, Severity, StatusLamp, overall, wor
 from .data.store import DroppedMessages, Store
 from .data.topic_rows import RESIDUALS
 
-ROWS, SPECTRUM, RESPONSE = 1, 2, 3
+ROWS, SPECTRUM = 1, 2
 HEAD = struct.Struct("<BBHI")
 
 

@@ -10,13 +10,14 @@ import asyncio
 import json
 import time
 from collections.abc import Collection
+from dataclasses import asdict
 from math import inf, isfinite
 from typing import Any
 from unicodedata import category
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from .data.analyst import Analyst, TipResponses, response_messages
+from .data.analyst import Analyst
 from .data.feed import Feed, Playback
 from .data.status import MAX_ALARMS
 from .data.store import Table
@@ -79,11 +80,10 @@ class Viewer:
         self._generation = -1
         self._tables = 0
         self._alarms = ""
-        self._response: TipResponses | None = None
 
     async def serve(self) -> None:
         """Send and receive until one task ends."""
-        tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectra, self._send_responses, self._receive)]
+        tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectra, self._send_rates, self._receive)]
         _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in others:
             task.cancel()
@@ -179,15 +179,14 @@ class Viewer:
                 await self._socket.send_bytes(block)
             await asyncio.sleep(SPECTRUM_PERIOD)
 
-    async def _send_responses(self) -> None:
-        """Send the response in the posture shown if the page does not have it."""
+    async def _send_rates(self) -> None:
+        """Send the pump rates to avoid in the posture shown if the page does not have them."""
+        sent = None
         while not self._socket.closed:
-            found = await self._analyst.response_at(self._position)
-            if found is not self._response:
-                self._response, (text, block) = found, response_messages(found)
-                await self._send_text(text)
-                if block:
-                    await self._socket.send_bytes(block)
+            found = await self._analyst.rates_at(self._position)
+            if found is not sent:
+                sent = found
+                await self._send_text({"kind": "rates", **asdict(found)})
             await asyncio.sleep(SPECTRUM_PERIOD)
 
     @property

@@ -26,7 +26,7 @@ CHROMIUM = Path("/usr/bin/chromium")
 pytestmark = pytest.mark.skipif(not CHROMIUM.is_file(), reason="chromium is not there (Debian: apt-get install chromium)")
 PATIENCE = 240_000  # ms
 FAULT = 25.0  # s, when encoder 3 is known to be wrong
-TABS = ("traces", "spectrum", "shape", "state", "path", "response")
+TABS = ("traces", "spectrum", "shape", "state", "path")
 
 
 @pytest.fixture(scope="module")
@@ -218,7 +218,7 @@ def test_the_page_speaks_the_language_of_its_viewer(
     table = json.loads(FILE.read_text(encoding="utf-8"))
     at = LANGUAGES.index(language) - 1
     assert [tab.strip() for tab in page.locator("#tabs span").all_inner_texts()] == [
-        table[name][at] for name in ("Traces", "Spectrum", "Shape", "Alarms", "Path", "Response")
+        table[name][at] for name in ("Traces", "Spectrum", "Shape", "Alarms", "Path")
     ]
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     with page.expect_navigation():

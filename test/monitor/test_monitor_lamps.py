@@ -84,8 +84,6 @@ def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
     judge(alarms, 7.0, replace(unknown, since=7 * 10**9))
     judge(alarms, 8.0)
     assert [(each.begin, each.end) for each in alarms.all] == [(2.0, 5.5), (7.0, 8.0)]
-    alarms.acknowledge_ended()
-    assert all(each.is_acknowledged for each in alarms.all)
 
 
 def test_all_is_not_well_where_messages_were_dropped() -> None:

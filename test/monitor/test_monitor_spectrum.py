@@ -7,9 +7,9 @@ import pytest
 from default_boom import strokes_of_posture
 from scipy.signal import lfilter, welch
 
-from boom_twin import frequency_response, load_scene
+from boom_twin import load_scene
 from boom_twin.analysis.posture_modes import ModeList
-from boom_twin.monitor.data.analyst import RESPONSE_FREQUENCIES, SEGMENT, ResponseList, spectrum
+from boom_twin.monitor.data.analyst import SEGMENT, RateList, spectrum
 
 RATE = 200.0
 TIMES = np.arange(int(40 * RATE)) / RATE
@@ -56,19 +56,15 @@ def test_missing_rows_and_uneven_times_do_no_harm() -> None:
     assert found is not None and found.peaks[0].frequency == pytest.approx(2.3, abs=0.01)
 
 
-def test_modes_and_responses_follow_the_posture() -> None:
-    """The response as `frequency_response` gives it for 1 N, and for 1 mm of a drive."""
+def test_modes_and_rates_to_avoid_follow_the_posture() -> None:
+    """The rates as the resonance map gives them for a pump of any height."""
     scene = load_scene()
-    modes, responses, strokes = ModeList(scene), ResponseList(scene), strokes_of_posture(scene, "arch")
-    natural, first = modes.at(strokes), responses.at(strokes)
+    modes, rates, strokes = ModeList(scene), RateList(scene), strokes_of_posture(scene, "arch")
+    natural, first = modes.at(strokes), rates.at(strokes)
     assert natural == pytest.approx([1.0618, 2.3006, 5.3833, 11.0895, 41.996, 47.265], rel=1e-3)
-    assert first.loads == ("1 N at the tip, up", *(f"1 mm of cylinder {i}" for i in range(1, 5))) and not first.trouble
-    by_force = frequency_response(scene, RESPONSE_FREQUENCIES, strokes=strokes).tip_acceleration
-    by_drive = frequency_response(scene, RESPONSE_FREQUENCIES, strokes=strokes, drive=3).tip_acceleration
-    assert first.accelerations[:, 0] == pytest.approx(np.linalg.norm(by_force, axis=1), rel=1e-9)
-    assert first.accelerations[:, 3] == pytest.approx(1e-3 * np.linalg.norm(by_drive, axis=1), rel=1e-9)
-    assert responses.at(strokes + 0.001) is first and modes.at(strokes + 0.001) is natural
-    assert not np.allclose(responses.at(strokes + 0.02).accelerations, first.accelerations, rtol=1e-3)
-    assert modes.at(strokes + 0.02) != natural
-    found = ResponseList(scene).at([9.0, 0.5, 0.5, 0.5])
-    assert found.loads == () and "stroke_1 = 9 m" in found.trouble
+    assert not first.trouble and any(low < natural[0] < high for low, high in first.avoid)
+    assert any(low < natural[0] / 3.0 < high for low, high in first.avoid), "its third harmonic"
+    assert rates.at(strokes + 0.001) is first and modes.at(strokes + 0.001) is natural
+    assert rates.at(strokes + 0.02).avoid != first.avoid and modes.at(strokes + 0.02) != natural
+    found = RateList(scene).at([9.0, 0.5, 0.5, 0.5])
+    assert found.avoid == () and "stroke_1 = 9 m" in found.trouble

@@ -1,9 +1,9 @@
-"""Analysis beside the server, of what is shown: spectrum, natural frequencies of the model, response of the tip to loads."""
+"""Analysis beside the server, of what is shown: spectrum, natural frequencies of the model, pump rates to avoid."""
 
 from __future__ import annotations
 
 import asyncio
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from ...errors import BoomTwinError
 from ...scene.pump_pulses import CHANGE_OVER
 from ...scene.schema import Scene
 from ...types import Array
-from ..protocol import RESPONSE, SPECTRUM, pack
+from ..protocol import SPECTRUM, pack
 from .feed import Feed
 from .topic_rows import ESTIMATE
 
@@ -39,37 +39,31 @@ SIGNALS = (
     PREDICTION,
 )
 """The best first: the prediction knows nothing of what shakes the boom."""
-RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)  # frequencies of the responses, Hz
+RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)  # of the response of the tip, Hz
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TipResponses:
-    """Amplitude of the tip's acceleration under harmonic loads."""
+class RatesToAvoid:
+    """Pump rates from and to (Hz) at which the tip swings too much in a posture; why they are not known."""
 
-    loads: tuple[str, ...] = ()  # in words
-    frequencies: Array = field(default_factory=lambda: np.zeros(0))  # (k,), Hz
-    accelerations: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, loads), both directions together, m/s^2
-    avoid: tuple[tuple[float, float], ...] = ()  # pump rates from and to (Hz) at which the tip swings too much
-    trouble: str = ""  # why there are none
+    avoid: tuple[tuple[float, float], ...] = ()
+    trouble: str = ""
 
 
-class ResponseList(PresentPosture[TipResponses]):
-    """Frequency response of the tip to 1 N at the tip, and to 1 mm of every cylinder's drive."""
+class RateList(PresentPosture[RatesToAvoid]):
+    """Pump rates to avoid, from the frequency response of the tip to 1 N there."""
 
     def __init__(self, scene: Scene) -> None:
         super().__init__()
         self._scene = scene
 
-    def _work_out(self, strokes: Array) -> TipResponses:
+    def _work_out(self, strokes: Array) -> RatesToAvoid:
         try:
             boom = linearised_boom(self._scene, strokes)
-            drives = range(boom.plan.joints)
-            loads = [boom.load(UPWARD), *(1e-3 * boom.load(drive=i) for i in drives)]
-            columns = [np.linalg.norm(boom.respond(RESPONSE_FREQUENCIES, load).tip_acceleration, axis=1) for load in loads]
+            response = boom.respond(RESPONSE_FREQUENCIES, boom.load(UPWARD)).tip_acceleration
         except BoomTwinError as error:
-            return TipResponses(trouble=str(error))
-        names = ("1 N at the tip, up", *(f"1 mm of cylinder {i + 1}" for i in drives))
-        return TipResponses(names, RESPONSE_FREQUENCIES, np.column_stack(columns), rates_to_avoid(columns[0]))
+            return RatesToAvoid(trouble=str(error))
+        return RatesToAvoid(rates_to_avoid(np.linalg.norm(response, axis=1)))
 
 
 PUMP_RATES = np.linspace(0.2, 1.2, 201)  # rates of a pump, Hz
@@ -145,8 +139,8 @@ def _peaks(frequencies: Array, density: Array, rate: float) -> list[Peak]:
     return peaks
 
 
-UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
-UNKNOWN_POSTURE = TipResponses(trouble="the posture is not known yet")
+UNKNOWN_SCENE = RatesToAvoid(trouble="the model is not known: give --scene")
+UNKNOWN_POSTURE = RatesToAvoid(trouble="the posture is not known yet")
 KNOWN_SHARE = 0.9  # share of the rows of a signal that must have a value
 MODE_DISTANCE = 0.2  # relative distance up to which a peak is taken for a mode of the model
 
@@ -157,8 +151,8 @@ class Analyst:
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
         self._modes: ModeList | None = None
-        self._responses: ResponseList | None = None
-        self._turn, self._response_turn = asyncio.Lock(), asyncio.Lock()
+        self._rates: RateList | None = None
+        self._turn, self._rates_turn = asyncio.Lock(), asyncio.Lock()
         self._known: tuple[tuple[int, int], tuple[dict[str, Any], bytes]] | None = None
 
     async def spectrum_at(self, time: float) -> tuple[dict[str, Any], bytes] | None:
@@ -186,19 +180,19 @@ class Analyst:
             self._known = key, ({**lines, "moved": moved if moved > MOVED else 0.0}, block)
             return self._known[1]
 
-    async def response_at(self, time: float) -> TipResponses:
-        """Return the tip's response to loads in the posture at `time` (s); the same object while the boom has not moved.
+    async def rates_at(self, time: float) -> RatesToAvoid:
+        """Return the pump rates to avoid in the posture at `time` (s); the same object while the boom has not moved.
 
         It has a model of its own, so that no spectrum waits for the first one, which compiles for half a minute.
         """
-        async with self._response_turn:
+        async with self._rates_turn:
             scene, strokes = self._feed.scene(), self._feed.strokes(time)
             if scene is None:
                 return UNKNOWN_SCENE
             if len(strokes) != len(scene.joints):
                 return UNKNOWN_POSTURE
-            self._responses = self._responses or ResponseList(scene)
-            return await asyncio.to_thread(self._responses.at, strokes)
+            self._rates = self._rates or RateList(scene)
+            return await asyncio.to_thread(self._rates.at, strokes)
 
     def _signal(self, time: float) -> Signal:
         """Return the best acceleration that has values in the last segment before `time` (s)."""
@@ -229,9 +223,3 @@ class Analyst:
             return []
         self._modes = self._modes or ModeList(scene)
         return self._modes.at(strokes)
-
-
-def response_messages(found: TipResponses) -> tuple[dict[str, Any], bytes]:
-    """Return text message ``loads`` and binary block of a response; the block is empty if there is no response."""
-    text = {"kind": "loads", "names": found.loads, "trouble": found.trouble, "avoid": found.avoid}
-    return text, pack(RESPONSE, 0, found.frequencies, found.accelerations.astype("f4")) if found.loads else b""

@@ -69,10 +69,10 @@ export class SpectrumTab {
 }
 
 // Labels of a logarithmic axis.
-export const oneDigit = (_, ticks) => ticks.map(tick => tick === null ? null : tick.toExponential(0).replace("+", ""));
+const oneDigit = (_, ticks) => ticks.map(tick => tick === null ? null : tick.toExponential(0).replace("+", ""));
 
 // Dashed lines over the plot at natural frequencies (Hz), each with the number of its mode.
-export function markFrequencies({ ctx, bbox, valToPos }, frequencies) {
+function markFrequencies({ ctx, bbox, valToPos }, frequencies) {
   ctx.save();
   ctx.font = `${13 * devicePixelRatio}px system-ui`;
   ctx.fillStyle = ctx.strokeStyle = themeColour("ink");
