@@ -20,7 +20,7 @@ from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from boom_twin import BagError, TimeWindow, load_scene, replay
-from boom_twin.batch.sources import sessions_of
+from boom_twin.batch.folder import sessions_of
 from boom_twin.offline.inputs import ReplayOptions
 from boom_twin.offline.replay import replay_into
 from boom_twin.offline.sample_table import SampleTable, columns_of, table_file

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ....plots.study import MatrixRow, matrix_picture
 from ....scene.kinematics import section_angles
 from ....scene.schema import Scene
 from ....system.atomic_files import write_atomic
@@ -29,7 +28,7 @@ MEANINGS = {
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None, soak: bool = False) -> list[Path]:
-    """Run the study on motions from `posture`; write stability.json, stability.md and stability.png; return their paths.
+    """Run the study on motions from `posture`; write stability.json and stability.md; return their paths.
 
     `quick`: a subset of the cases. `soak`: the holds of 24 simulated hours as well, by the default method.
     """
@@ -54,11 +53,9 @@ def write_files(
     out: Path, rows: list[CaseResult], long_rows: list[CaseResult], limits: dict[str, Limit], move: str
 ) -> list[Path]:
     """Write all files; `long_rows` are holds of a day, `move` tells of the scene's motion."""
-    paths = [out / f"stability.{kind}" for kind in ("json", "md", "png")]
+    paths = [out / f"stability.{kind}" for kind in ("json", "md")]
     write_json(paths[0], _content(rows + long_rows, limits))
     write_atomic(paths[1], text(rows, long_rows, limits, move))
-    lines = [MatrixRow(row.case.group, row.case.name, [cell.verdict.mark for cell in row.cells.values()]) for row in rows]
-    matrix_picture(paths[2], "Where each method holds", list(rows[0].cells), lines)
     return paths
 
 
@@ -73,7 +70,6 @@ def text(rows: Sequence[CaseResult], long_rows: Sequence[CaseResult], limits: di
         "Every method integrates every case. The reference is the default method at an eighth of the step (Newton tolerance "
         f"1e-10 rad), or the equilibrium. The move: {move}. Cases make all or part of it, in 1 s unless stated otherwise. "
         "Accelerations and forces within 50 ms after a speed jump are impulses and are ignored.",
-        "![Where each method holds](stability.png)",
         "## Verdicts by method", "".join(f"- {mark}: {meaning}.\n" for mark, meaning in MEANINGS.items()), _counts(rows),
         "## The default",
         "All cases hold except:", _default(rows),
