@@ -26,7 +26,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--tip-acceleration", type=positive, default=0.5, metavar="A", help=acceleration)
     parser.add_argument("--duration", type=positive, metavar="S", help="s (default 60)")
     parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise (0)")
-    parser.add_argument("--clean", action="store_true", help="sensors without noise and rounding")
     share = "every k, d, EI and mass of the simulated boom off by this share, at random: 0.02 is 2 %% (0)"
     parser.add_argument("--wrong", type=float, default=0.0, metavar="SHARE", help=share)
     parser.add_argument("--rig-seed", type=int, default=0, metavar="N", help="of --wrong: one boom for each (0)")
@@ -123,20 +122,17 @@ def run(args: Namespace) -> int:
         faults,
         faulty_boom,
         loads,
-        noise_free,
         random_programme,
         through_postures,
     )
     from ..validation.rig import record as record_session
-    from ..validation.rig.sensors import RATE
 
     assumed, out = scene_from(args.scene), Path(args.out)
     tell_oddities(assumed.oddities, assumed.source)
     scene = assumed.scene
     duration = BUNDLED_DURATION if args.duration is None else args.duration
     recorded = set(sensors_of(args.sensors))
-    rate = RATE if args.rate is None else args.rate
-    sensors = noise_free(rate) if args.clean else Sensors(rate)
+    sensors = Sensors() if args.rate is None else Sensors(args.rate)
     asked = (("imu", args.imu), ("moment", args.moment), ("point", args.point))
     places = {name: place for kind, texts in asked for name, place in named_places(kind, texts, scene).items()}
     cylinders = _cylinders(args.pressures, scene)
@@ -154,7 +150,7 @@ def run(args: Namespace) -> int:
     else:
         programme = random_programme(scene, args.random, duration, args.seed) if args.random else bundled(scene)
     drive = faults.drifting(programme, wrong)
-    notes = {"origin": RIG_ORIGIN, "noise": "none" if args.clean else "standard", "seed": str(args.seed)}
+    notes = {"origin": RIG_ORIGIN, "noise": "standard", "seed": str(args.seed)}
     if args.wrong:
         notes["wrong"] = f"k, d, EI and masses off by {args.wrong:g}, rig seed {args.rig_seed}"
     if wrong:
@@ -163,7 +159,7 @@ def run(args: Namespace) -> int:
         notes["loads"] = f"at the tip, wind seed {args.seed}: " + ", ".join(map(str, pushing))
     if args.rate is not None:
         notes["rate"] = f"{args.rate:g} Hz"
-    if "forces" in recorded and not args.clean:
+    if "forces" in recorded:
         notes["forces"] = f"noise {sensors.force_sigma:g} N, resolution {sensors.force_resolution:g} N"
     with result_folder(out, RIG, files_of(args, "scene")) as building:
         tell(f"simulating {duration:g} s, about as long as that ..")

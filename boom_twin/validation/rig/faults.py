@@ -21,8 +21,8 @@ from ...errors import UsageError
 from ...scene.edit import parameter
 from ...scene.schema import Scene
 from ...types import SECOND, Array
-from .exudyn.solve import Drive
 from .session import RigSession
+from .solve import Drive
 
 _ANY, _MORE, _FACTOR = "finite and not 0", "above 0", "above 1"
 _SHARE, _LOSS, _PLAY = "above 0 and at most 1, a share", "above 0 and below 1, a share", "above 0 and below 0.005 m"

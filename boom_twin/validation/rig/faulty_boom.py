@@ -11,8 +11,8 @@ from ...errors import UsageError
 from ...scene.edit import parameter, parameter_names, scaled, with_parameters
 from ...scene.schema import Clearance, CylinderPart, Joint, Pin, Scene
 from ...types import Array
-from .exudyn.solve import Change
 from .faults import RigFault
+from .solve import Change
 
 JOURNAL = 0.025  # m, radius of a pin that the scene does not list
 

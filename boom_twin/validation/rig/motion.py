@@ -15,7 +15,7 @@ from ...scene.load import load_scene
 from ...scene.pump_pulses import ease
 from ...scene.schema import Scene
 from ...types import Array
-from .exudyn.system import section_frames
+from .system import section_frames
 
 
 def ease_rate(x: Array) -> Array:

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...analysis.motions import DURATION
 from ...errors import SolverError
-from ...plots.study import Bars, parts_picture
 from ...reduction.deviation import (
     FREQUENCIES,
     Deviation,
@@ -23,7 +22,7 @@ from ...reduction.deviation import (
     step_times,
     unknowns,
 )
-from ...reduction.variants import Variant, variants
+from ...reduction.search import Variant, variants
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
 from ...types import Array
@@ -94,13 +93,12 @@ def _part(scene: Scene, variant: Variant, found: Response, time: float, full: Re
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
-    """Measure in a move from `posture`; write parts.json, parts.md and parts.png into the folder `out`; return their paths."""
+    """Measure in a move from `posture`; write parts.json and parts.md into the folder `out`; return their paths."""
     course = course_of(scene, posture, QUICK_DURATION if quick else DURATION)
     found = measure(scene, course, QUICK_ROUNDS if quick else ROUNDS)
-    paths = [out / f"parts.{kind}" for kind in ("json", "md", "png")]
+    paths = [out / f"parts.{kind}" for kind in ("json", "md")]
     write_json(paths[0], as_json(found))
     write_atomic(paths[1], as_markdown(found))
-    parts_picture(paths[2], bars(found), "surrogate parameters; one motion, another may differ")
     return paths
 
 
@@ -136,7 +134,6 @@ def as_markdown(found: PartsStudy) -> str:
     first, second = (1e6 * time for time in found.full_times)
     parts = [
         "# What the parts of a model cost, and what leaving them out changes",
-        "![What leaving a part out changes, and what it saves](parts.png)",
         f"Each row compares an edited scene with the full scene ({found.unknowns} unknowns). A step of the full scene took "
         f"{first:.2f} us, and {second:.2f} us at the end. Smaller differences are noise.",
         f"- At rest: largest distance between the tips. States: {', '.join(found.course.names)}.\n"
@@ -156,14 +153,3 @@ def _row(found: PartsStudy, part: VariantCost) -> Sequence[object]:
         return [f"{part.variant.name}: {part.status}", *[None] * (len(HEAD) - 1)]
     off = part.deviation
     return [part.variant.name, 1e3 * off.rest, 1e3 * off.most, 100.0 * float(part.shifts[0]), 100.0 * found.saved(part)]
-
-
-def bars(found: PartsStudy) -> Bars:
-    """Return the bars of the picture."""
-    good = [part for part in found.shown if part.status == "ok"]
-    return Bars(
-        names=tuple(part.variant.name for part in good),
-        rest=np.array([part.deviation.rest for part in good]),
-        move=np.array([part.deviation.most for part in good]),
-        saved=np.array([found.saved(part) for part in good]),
-    )

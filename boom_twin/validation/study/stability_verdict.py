@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ....analysis.methods import MethodRun
-from ....types import Array
+from ...analysis.methods import MethodRun
+from ...types import Array
 
 Word = Literal["holds", "degrades", "fails", "refuses"]
 Mask = NDArray[np.bool_]
@@ -118,15 +118,15 @@ def _lasting(found: MethodRun, right: MethodRun, jump: float, largest: float) ->
     return float((late.max() - jump) / right.times[1]) if late.size else 0.0
 
 
-def against_rest(found: MethodRun, equilibrium: Array | None, still: float, every: int = 1) -> Facts:
+def against_rest(found: MethodRun, equilibrium: Array | None, still: float) -> Facts:
     """Return the deviations at the end of a long hold from the tip's `equilibrium` (m), shape (2,).
 
-    If that is None, drift is the shift of the mean over the hold. `every` is the number of steps per row; ringing needs 1.
+    If that is None, drift is the shift of the mean over the hold.
     """
     late = np.flatnonzero(found.times > still)
     first, last = late[: len(late) // 4], late[-(len(late) // 4) :]
     away = found.tip[-1] - equilibrium if equilibrium is not None else found.tip[last].mean(0) - found.tip[first].mean(0)
-    ringing = _rings(found, None, found.times > still) if every == 1 else (math.nan, math.nan)
+    ringing = _rings(found, None, found.times > still)
     return Facts(
         found.status,
         doubt=found.doubt,

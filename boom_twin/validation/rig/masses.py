@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ....scene.schema import Point, RigidPart, Scene, Section
+from ...scene.schema import Point, RigidPart, Scene, Section
 
 
 @dataclass(frozen=True, slots=True)

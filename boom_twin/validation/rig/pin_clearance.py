@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import UsageError
-from ....scene.schema import Material, Pin, Scene
-from ....types import Array
-from ...contact_law import HYSTERESIS, Contact, stiffness
+from ...errors import UsageError
+from ...scene.schema import Material, Pin, Scene
+from ...types import Array
+from ..contact_law import HYSTERESIS, Contact, stiffness
 from . import exudyn
 
 LEAST_GAP = 3e-5  # m, of the radii in K, which grows without bound while the pin becomes ideal

@@ -3,7 +3,7 @@
 The model shares no equation with the twin. Every node holds absolute x, y and rotation in the base's axes; the rigid
 root and head of a section sit on the end nodes of its beam, so they add no unknowns. A part that the scene does not
 name has no mass here; massless links stay as bodies, held by as many constraints as they have unknowns. A lumped boom
-has no bodies for cylinders and two-force links; see `lumped_masses`.
+has no bodies for cylinders and two-force links; see `linkages`.
 
 Sources: J. Simo and L. Vu-Quoc, "On the dynamics of flexible beams under large overall motions - the plane case",
 J. Appl. Mech. 53 (1986), for the beam; Exudyn (J. Gerstmayr) for everything that is solved.
@@ -17,15 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import UsageError
-from ....scene.kinematics import gravity_in_base
-from ....scene.schema import Cylinder, CylinderPart, Pin, Scene
-from ....types import Array
+from ...errors import UsageError
+from ...scene.kinematics import gravity_in_base
+from ...scene.schema import Cylinder, CylinderPart, Pin, Scene
+from ...types import Array
 from . import exudyn, items, masses
-from .lumped_masses import lump_masses
+from .linkages import Link, lump_masses, six_bar
 from .masses import Lump, Lumps
 from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
-from .six_bar import Link, six_bar
 from .system import Base, Boom, BuiltSection, Frame, Site, Station, oil_stiffness, section_frames
 
 SAME_PLACE = 1e-9  # m
@@ -254,7 +253,7 @@ def build(
     """Build the undeformed boom with its drives at absolute `strokes` (m), shape (n,). Sensors may still be added.
 
     A flexible section has `elements` finite elements, at least one per part between cylinder brackets. `nodally_exact`: few
-    elements bend as many do, see `shear_stiffness`. `lumped`: see `lumped_masses`; it needs ideal pins and a rigid base.
+    elements bend as many do, see `shear_stiffness`. `lumped`: see `linkages`; it needs ideal pins and a rigid base.
     Sensors are at `sites`. UsageError for worn pins other than of rods, and for a lumped boom that cannot be.
     """
     refuse_other_pins(scene)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ....scene.kinematics import joint_angles_of_strokes
-from ....scene.schema import Cylinder, Point, Scene
-from ....types import Array
+from ...scene.kinematics import joint_angles_of_strokes
+from ...scene.schema import Cylinder, Point, Scene
+from ...types import Array
 from . import items
 from .masses import Gathered, LumpedMasses
 from .pin_clearance import Bush

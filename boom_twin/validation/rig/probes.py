@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ....types import Array
+from ...types import Array
 from . import exudyn, items
 from .system import Boom, Site, Station
 
@@ -22,7 +22,7 @@ class Probes:
     """Exudyn sensor numbers of all recorded quantities."""
 
     tip: tuple[int, int]  # position, acceleration
-    head: tuple[int, int]  # velocity, acceleration of the last head's node
+    head: int  # velocity of the last head's node
     roots: tuple[int, ...]
     heads: tuple[int, ...]
     forces: tuple[int, ...]
@@ -31,23 +31,21 @@ class Probes:
     sites: tuple[
         tuple[int, int, int, int], ...
     ]  # position and acceleration of every site, coordinates of its frame, their rates
-    pins: tuple[tuple[int, int], ...]  # positions of hole and journal, for every pin with play
     base: int | None  # of an elastic base
 
 
 def attach(boom: Boom) -> Probes:
     """Add all sensors. Call this before the system is assembled."""
-    kind, last = exudyn.OutputVariableType, boom.sections[-1].head
+    kind = exudyn.OutputVariableType
     return Probes(
         tip=(_at_tip(boom, kind.Position), _at_tip(boom, kind.Acceleration)),
-        head=(_on_node(boom, last, kind.Coordinates_t), _on_node(boom, last, kind.Coordinates_tt)),
+        head=_on_node(boom, boom.sections[-1].head, kind.Coordinates_t),
         roots=tuple(_on_node(boom, section.root, kind.Coordinates) for section in boom.sections),
         heads=tuple(_on_node(boom, section.head, kind.Coordinates) for section in boom.sections),
         forces=tuple(_on_drive(boom, drive, _FORCE[name]) for drive, name in boom.drives),
         lengths=tuple(_on_drive(boom, drive, kind.Distance) for drive, _ in boom.drives),
         moments=tuple(_about_site(boom, site) for site in boom.sites),
         sites=tuple(_at_site(boom, site) for site in boom.sites),
-        pins=tuple((_on_marker(boom, bush.sides[0]), _on_marker(boom, bush.sides[1])) for bush in boom.bushes),
         base=None if boom.base.node is None else _sensor(boom, kind.Coordinates, items.SensorNode, nodeNumber=boom.base.node),
     )
 
@@ -55,9 +53,9 @@ def attach(boom: Boom) -> Probes:
 def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
     """Return all recorded rows (m); if `at_rest`, one row with the present equilibrium. SI.
 
-    Keys: ``t`` (m,); ``tip``, ``tip_acc`` (m, 2); ``tip_angle``, ``tip_rate``, ``tip_rate_dot`` (m,); ``joints``, ``forces``
+    Keys: ``t`` (m,); ``tip``, ``tip_acc`` (m, 2); ``tip_angle``, ``tip_rate`` (m,); ``joints``, ``forces``
     (tension), ``lengths`` (m, n; pin to pin less `closed_length`); ``sites`` (m, k, 7): x, y, their accelerations, angle, its
-    rate, bending moment by the curvature (NaN off a beam); ``pins`` (m, k, 2), offsets of the journals with play.
+    rate, bending moment by the curvature (NaN off a beam).
     """
     data = partial(_data, boom, at_rest=at_rest)
     roots = np.column_stack([_angle(data(p), s.root) for p, s in zip(probes.roots, boom.sections, strict=True)])
@@ -70,8 +68,7 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
         "tip": data(probes.tip[0])[:, 1:3],
         "tip_acc": data(probes.tip[1])[:, 1:3],
         "tip_angle": heads[:, -1],
-        "tip_rate": data(probes.head[0])[:, 3],
-        "tip_rate_dot": data(probes.head[1])[:, 3],
+        "tip_rate": data(probes.head)[:, 3],
         "joints": roots - before,
         "forces": np.column_stack([_force(boom, i, p, at_rest) for i, p in enumerate(probes.forces)]),
         "lengths": np.column_stack([data(p)[:, 1] - c.closed_length for p, c in zip(probes.lengths, cylinders, strict=True)]),
@@ -82,9 +79,6 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
             ]
         )
         .reshape(len(boom.sites), len(heads), 7)
-        .swapaxes(0, 1),
-        "pins": np.array([data(journal)[:, 1:3] - data(hole)[:, 1:3] for hole, journal in probes.pins])
-        .reshape(len(probes.pins), len(heads), 2)
         .swapaxes(0, 1),
     }
 
@@ -151,10 +145,6 @@ def _at_tip(boom: Boom, kind: Any) -> int:
 
 def _on_node(boom: Boom, station: Station, kind: Any) -> int:
     return _sensor(boom, kind, items.SensorNode, nodeNumber=station.node)
-
-
-def _on_marker(boom: Boom, marker: int) -> int:
-    return _sensor(boom, exudyn.OutputVariableType.Position, items.SensorMarker, markerNumber=marker)
 
 
 def _on_drive(boom: Boom, drive: int, kind: Any) -> int:

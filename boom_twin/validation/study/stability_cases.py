@@ -10,15 +10,14 @@ from typing import Literal
 
 import numpy as np
 
-from ....analysis.methods import Drive
-from ....analysis.motions import Motion, motion_of
-from ....scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
-from ....scene.load import load_scene
-from ....scene.pump_pulses import ease
-from ....scene.schema import Scene
-from ....types import Array
-from .. import scene_changes as made
-from ..long_booms import long_boom, seven_sections
+from ...analysis.methods import Drive
+from ...analysis.motions import Motion, motion_of
+from ...scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
+from ...scene.load import load_scene
+from ...scene.pump_pulses import ease
+from ...scene.schema import Scene
+from ...types import Array
+from . import scenes as made
 
 TRAVEL_SHARE = 0.05  # distance of the start from the end, over a cylinder's travel
 RANGE_SAMPLES = 1001  # angles over a joint's range
@@ -35,7 +34,6 @@ class Setup:
     duration: float  # s
     step: float
     still: float  # time (s) after which the drives stand still
-    every: int = 1  # steps per row
     jump: float = math.nan  # time (s) of a jump in speed, or NaN; accelerations and forces are impulses there, without a value
 
 
@@ -63,13 +61,12 @@ def ease_integral(x: Array) -> Array:
 
 
 def smooth(
-    scene: Scene, posture: str | None = None, share: float = 1.0, rise: float = 1.0, duration: float = 2.0, step: float = 1e-3,
-    every: int = 1,
+    scene: Scene, posture: str | None = None, share: float = 1.0, rise: float = 1.0, duration: float = 2.0, step: float = 1e-3
 ) -> Setup:  # fmt: skip
     """Move by `share` of the study's move in `rise` (s), then rest until `duration` (s)."""
     own = motion_of(scene, posture)
     move = replace(own, travel=share * own.travel, rise=rise, duration=duration)
-    return Setup(scene, move, own.angles, duration, step, rise, every)
+    return Setup(scene, move, own.angles, duration, step, rise)
 
 
 def move_in_words(scene: Scene) -> str:
@@ -146,11 +143,11 @@ PAYLOADS = (0.1, 1.0, 3.0, 10.0)
 MODE_COUNTS = (1, 2, 4, 6, 8, 10)
 HANGING = (0.0, -90.0, -90.0, -90.0)  # deg
 FOLDED = (80.0, -80.0, -240.0, -400.0)  # deg
-TEN_MINUTES, DAY, LARGE_STEP = 600.0, 86400.0, 2e-2  # s
+TEN_MINUTES, LARGE_STEP = 600.0, 2e-2  # s
 
 
 def cases(scene: Scene) -> tuple[Case, ...]:
-    """Return all cases of a scene but the holds of a day; those with a geometry of their own take the default boom."""
+    """Return all cases of a scene; those with a geometry of their own take the default boom."""
     found = (
         Case("scene", "as it is", "nothing", partial(smooth, scene), quick=True),
         *_stiffness(scene), *_masses(scene), *_steps(scene), *_sections(), *_geometry(scene),
@@ -203,11 +200,11 @@ def _sections() -> Iterator[Case]:
 
 
 def _long(count: int) -> Setup:
-    return first_cylinder(long_boom(count), "test", 0.03, 1e-3, 0.5, 1.0 if count <= 20 else 0.6)
+    return first_cylinder(made.long_boom(count), "test", 0.03, 1e-3, 0.5, 1.0 if count <= 20 else 0.6)
 
 
 def _large() -> Setup:
-    return first_cylinder(seven_sections(), "test", 0.05, 5e-3, duration=4.0)
+    return first_cylinder(made.seven_sections(), "test", 0.05, 5e-3, duration=4.0)
 
 
 def _geometry(scene: Scene) -> Iterator[Case]:
@@ -258,15 +255,3 @@ def _payload_and_modes(scene: Scene) -> Iterator[Case]:
     for count in MODE_COUNTS:
         make = partial(smooth, made.with_modes(scene, count))
         yield Case("modes", f"{count} a part", "bending coordinates", make, quick=count == MODE_COUNTS[-1])
-
-
-def long_holds(scene: Scene) -> tuple[Case, ...]:
-    """Return the holds of 24 simulated hours."""
-    booms: tuple[tuple[str, Scene, Truth], ...] = (
-        ("24 h", scene, "equilibrium"),
-        ("24 h, undamped", made.undamped(scene), "swing"),
-    )
-    return tuple(
-        Case("hold", name, "dt 20 ms, after the move", partial(smooth, boom, None, 1.0, 1.5, DAY, LARGE_STEP, 50), truth)
-        for name, boom, truth in booms
-    )

@@ -13,19 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import SolverError, UsageError
-from ....scene.schema import Scene
-from ....types import Array
+from ...errors import SolverError, UsageError
+from ...scene.schema import Scene
+from ...types import Array
 from . import exudyn
 from .boom import SHEAR_OVER_AXIAL, build
-from .parameter_changes import ParameterChanges
-from .pin_clearance import pin_with_play
 from .probes import Probes, attach, read
-from .stepping import Course, Effort, Scheme, step_through
-from .system import Boom, Site, section_frames
+from .stepping import Course, Effort, ParameterChanges, Scheme, step_through
+from .system import Boom, Site
 
 PASSES = 40
-SITE = ("x_m", "y_m", "ax_m_s2", "ay_m_s2", "angle_rad", "rate_rad_s", "moment_Nm")  # ends of the columns of a site
 LAST_INCREMENT = 1e-6  # m and rad, last increment; what is left is near its square
 LONGEST_INCREMENT = 0.2  # m and rad, in one pass
 NUDGE = 1e-5  # m and rad, of the difference quotient
@@ -86,24 +83,12 @@ Change = tuple[Scene, Callable[[Array], Array]]
 """A scene that differs in stiffnesses or masses only; times (m,) in s -> share (m,) of the difference, 0 at t = 0."""
 
 
-def statics(scene: Scene, strokes: Array, elements: int = 16) -> dict[str, list[float]]:
-    """Solve the equilibrium under gravity at absolute `strokes` (m), shape (n,). Return lists, SI, the base's axes.
+def statics(scene: Scene, strokes: Array, elements: int = 16) -> dict[str, Array]:
+    """Return what `probes.read` gives of the equilibrium under gravity at absolute `strokes` (m), shape (n,).
 
     There are no frequencies: Exudyn's eigenvalues lack the geometric stiffness.
     """
-    strokes = np.asarray(strokes, float)
-    boom = build(scene, strokes, elements)
-    probes = attach(boom)
-    settle(boom, strokes)
-    found = {key: values[-1] for key, values in read(boom, probes, at_rest=True).items()}
-    rigid = section_frames(scene, strokes)[-1].point((scene.sections[-1].length, 0.0))
-    return {
-        "stroke_m": strokes.tolist(),
-        "tip_rigid_m": rigid.tolist(),
-        "tip_m": found["tip"].tolist(),
-        "joint_rad": found["joints"].tolist(),
-        "cylinder_force_N": found["forces"].tolist(),
-    }
+    return {name: rows[0] for name, rows in at_rest(scene, np.asarray(strokes, float), elements).rows.items()}
 
 
 def simulate(
@@ -117,12 +102,9 @@ def simulate(
     changes: Sequence[Change] = (),
     sites: tuple[Site, ...] = (),
 ) -> dict[str, Array]:
-    """Integrate the motion from rest in the equilibrium of the drive's first strokes; return columns (rows,), SI.
+    """Integrate the motion from rest in the equilibrium of the drive's first strokes; return what `move` does.
 
-    Rates are zero at t = 0; `t_end` and `output_step` (s) are multiples of `step`. The columns are those of a simulation
-    (``t_s``, ``stroke_1_m``, .., ``joint_1_rad``, .., ``tip_x_m``, ``tip_ax_m_s2``, .., ``cylinder_force_1_N``, ..), angle,
-    rate and angular acceleration of the tip, ``length_1_m``, .., of every one of the `sites` those of `SITE` (``site_1_x_m``,
-    ..), and offsets of journals with play (``cylinder_1_rod_dx_m``, ..).
+    Rates are zero at t = 0; `t_end` and `output_step` (s) are multiples of `step`.
     """
     first = drive(np.zeros(1))[0][0]
     return move(at_rest(scene, first, elements, sites=sites), drive, t_end, step, output_step, None, load, changes)[0]
@@ -130,11 +112,11 @@ def simulate(
 
 @dataclass(frozen=True)
 class Resting:
-    """A boom in equilibrium, which may be moved from there any number of times; cylinder forces (n,) in N."""
+    """A boom in equilibrium, which may be moved from there any number of times; `rows` are of `probes.read`, one each."""
 
     boom: Boom
     probes: Probes
-    forces: Array
+    rows: dict[str, Array]
 
 
 def at_rest(
@@ -150,7 +132,7 @@ def at_rest(
     boom = build(scene, strokes, elements, nodally_exact, lumped, shear_over_axial, sites)
     probes = attach(boom)
     settle(boom, strokes)
-    return Resting(boom, probes, read(boom, probes, at_rest=True)["forces"][-1])
+    return Resting(boom, probes, read(boom, probes, at_rest=True))
 
 
 def move(
@@ -163,7 +145,10 @@ def move(
     load: TipLoad | None = None,
     changes: Sequence[Change] = (),
 ) -> tuple[dict[str, Array], Effort]:
-    """Integrate the motion of a boom at rest by a chosen scheme; return the columns of `simulate` and the effort."""
+    """Integrate the motion of a boom at rest by a chosen scheme; return the rows of `probes.read`, and the effort.
+
+    ``drives`` (m, n) are added: strokes of the drives, m.
+    """
     every = _ratio("output_step", output_step, step)
     count = _ratio("t_end", t_end, step)
     times: Array = step * np.arange(count + 1, dtype=np.float64)
@@ -172,10 +157,9 @@ def move(
     course = Course(strokes, rates, None if load is None else load(times), ParameterChanges(resting.boom, others))
     effort = step_through(resting.boom, course, step, output_step, scheme or Scheme())
     found = read(resting.boom, resting.probes, at_rest=False)
-    found["forces"][0] = resting.forces  # Exudyn starts with zero multipliers, so incompressible cylinders would read zero
-    worn = [pin_with_play(resting.boom.scene, index) for index in range(len(resting.boom.scene.joints))]
-    names = [pin.at.replace(".", "_") for pin in worn if pin is not None]
-    return _columns(found, drive, times[::every], names), effort
+    found["forces"][0] = resting.rows["forces"][0]  # Exudyn starts with zero multipliers: incompressible cylinders read zero
+    found["t"] = _recorded_times(found["t"], times[::every])
+    return found | {"drives": drive(found["t"])[0]}, effort
 
 
 def _built_alike(boom: Boom, scene: Scene, strokes: Array) -> Boom:
@@ -200,30 +184,8 @@ def _ratio(name: str, whole: float, step: float) -> int:
     return count
 
 
-def _columns(found: dict[str, Array], drive: Drive, times: Array, pins: Sequence[str]) -> dict[str, Array]:
-    if len(found["t"]) != len(times) or np.abs(found["t"] - times).max() > 2.0 * times[1]:
-        raise SolverError(f"Exudyn recorded {len(found['t'])} of {len(times)} rows. Choose another output_step.")
-    # in long runs the sum of steps falls short of a whole output step, and Exudyn records one step later
-    times = np.where(np.abs(found["t"] - times) < 1e-6, times, found["t"])
-    strokes = drive(times)[0]
-    number = range(1, strokes.shape[1] + 1)
-    return {
-        "t_s": times,
-        **{f"stroke_{i}_m": strokes[:, i - 1] for i in number},
-        **{f"joint_{i}_rad": found["joints"][:, i - 1] for i in number},
-        "tip_x_m": found["tip"][:, 0],
-        "tip_y_m": found["tip"][:, 1],
-        "tip_ax_m_s2": found["tip_acc"][:, 0],
-        "tip_ay_m_s2": found["tip_acc"][:, 1],
-        **{f"cylinder_force_{i}_N": found["forces"][:, i - 1] for i in number},
-        "tip_angle_rad": found["tip_angle"],
-        "tip_angular_velocity_rad_s": found["tip_rate"],
-        "tip_angular_acceleration_rad_s2": found["tip_rate_dot"],
-        **{f"length_{i}_m": found["lengths"][:, i - 1] for i in number},
-        **{
-            f"site_{k + 1}_{name}": found["sites"][:, k, j]
-            for k in range(found["sites"].shape[1])
-            for j, name in enumerate(SITE)
-        },
-        **{f"{pin}_d{axis}_m": found["pins"][:, k, j] for k, pin in enumerate(pins) for j, axis in enumerate("xy")},
-    }
+def _recorded_times(recorded: Array, times: Array) -> Array:
+    """Return the times (s) of recorded rows; in long runs the sum of steps is short, and Exudyn records one step later."""
+    if len(recorded) != len(times) or np.abs(recorded - times).max() > 2.0 * times[1]:
+        raise SolverError(f"Exudyn recorded {len(recorded)} of {len(times)} rows. Choose another output_step.")
+    return np.where(np.abs(recorded - times) < 1e-6, times, recorded)
