@@ -90,24 +90,23 @@ class Unknown:
         return self.present * math.exp(step) if self.kind.relative else self.present + step
 
 
-def usual_names(
-    scene: Scene,
-    streams: Sequence[Stream],
-    load: str | None = None,
-    damping: str | None = None,
-    stiffness: bool = False,
-    zeros: str = "all",
-) -> list[str]:
-    """Return the default unknowns: stiffness of every cylinder, zero of every sensor of `streams`, and those requested.
+@dataclass(frozen=True)
+class Choice:
+    """Unknowns to estimate: `names`, or if there are none the usual ones and those requested by the other fields."""
 
-    `load` is payload or line_fill; `damping` d (cylinders) or beta (sections); `stiffness` adds that of sections in bending
-    and of an elastic base; `zeros` are all, angles (all but those of stroke transducers, which are then taken to be right) or
-    none.
-    """
-    ends = [".k", *([f".{damping}"] if damping else []), *([".EI", ".stiffness"] if stiffness else [])]
+    names: tuple[str, ...] = ()
+    load: str | None = None  # payload or line_fill
+    damping: str | None = None  # d (cylinders) or beta (sections)
+    stiffness: bool = False  # of sections in bending, and of an elastic base
+    zeros: str = "all"  # all, angles (stroke transducers are then taken to be right) or none
+
+
+def usual_names(scene: Scene, streams: Sequence[Stream], choice: Choice) -> list[str]:
+    """Return the default unknowns: stiffness of every cylinder, zero of every sensor of `streams`, and those of `choice`."""
+    ends = [".k", *([f".{choice.damping}"] if choice.damping else []), *([".EI", ".stiffness"] if choice.stiffness else [])]
     names = [name for end in ends for name in parameter_names(scene) if name.endswith(end)]
-    names += {None: [], "payload": ["tip.payload"], "line_fill": ["line_fill"]}[load]
-    trusted = {"all": (), "angles": (Stream.STROKES,), "none": tuple(Stream)}[zeros]
+    names += {None: [], "payload": ["tip.payload"], "line_fill": ["line_fill"]}[choice.load]
+    trusted = {"all": (), "angles": (Stream.STROKES,), "none": tuple(Stream)}[choice.zeros]
     return names + zero_names(scene, [stream for stream in streams if stream not in trusted])
 
 
