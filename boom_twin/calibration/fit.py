@@ -32,7 +32,6 @@ from .unknowns import Unknown
 DIFFERENCE = 3e-3  # of a prior's deviation, of derivatives
 BLOCK = 2.0  # s of a block of readings, which are taken to depend on each other
 LOADS, USUAL = (1e-5, 0.3), 2.5e-3  # shares of the boom's weight, between which the load's size is looked for; at first
-EXACT = 0.15  # of the logarithm of that size
 
 
 @dataclass(frozen=True)
@@ -140,7 +139,7 @@ class CalibrationProblem:
             def cost(sizes: Array) -> float:
                 return likelihood_cost(boom.filtered(np.exp(2.0 * sizes), sensors, self._zero2)[0])
 
-            exact = {"xatol": EXACT}
+            exact = {"xatol": 0.15}  # of the logarithm of the size
             both = minimize_scalar(lambda size: cost(np.full(2, size)), bounds=bounds, method="bounded", options=exact).x
             options = exact | {"fatol": 0.5, "initial_simplex": both + np.array([[0.0, 0.0], [-1.0, 0.0], [0.0, -1.0]])}
             found = minimize(cost, np.full(2, both), method="Nelder-Mead", bounds=[tuple(bounds)] * 2, options=options).x
@@ -168,8 +167,6 @@ def likelihood_cost(found: Array) -> float:
 
 
 MOST = 12  # passes
-HALVINGS = 5  # of a step that makes the fit worse
-LARGEST = 1.0  # standard deviations of the prior, of a step
 ENOUGH = 0.1  # standard deviations of the estimate, of a step
 NEAR = 1.0  # standard deviations of the estimate, of a step, from which on the noise is no more learnt
 
@@ -233,7 +230,7 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callab
         if furthest < ENOUGH or passes == MOST:
             break
         step = bounded_minimum(precision, pull, problem.least - at)
-        step /= max(1.0, float(np.abs(step).max()) / LARGEST)
+        step /= max(1.0, float(np.abs(step).max()))  # one deviation of a prior at most
         step = _shortened(problem, at, step, noise, base)
         at, furthest = at + step, float((np.abs(step) / np.sqrt(np.diag(np.linalg.inv(precision)))).max())
         if learning and furthest < NEAR:
@@ -247,7 +244,7 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callab
 
 def _shortened(problem: CalibrationProblem, at: Array, step: Array, noise: Noise, base: Array) -> Array:
     before = likelihood_cost(base) + 0.5 * at @ at
-    for _ in range(HALVINGS):
+    for _ in range(5):
         (found,) = problem.innovations([problem.values(at + step)], noise)
         if likelihood_cost(found) + 0.5 * (at + step) @ (at + step) <= before:
             break
@@ -277,9 +274,6 @@ def _together(slopes: Array, others: Array, base: Array) -> Array:
     return np.asarray(innovations + 0.5 * (slopes[:, :, 1] / variance**2) @ others[:, :, 1].T)
 
 
-TOGETHER = 0.7  # correlation from which on two unknowns count as one group
-
-
 @dataclass(frozen=True)
 class InseparableUnknowns:
     """Unknowns that the sessions cannot tell apart or determine; one alone: the sessions do not show it."""
@@ -298,7 +292,7 @@ def groups_of(problem: CalibrationProblem, fit: Fit) -> list[InseparableUnknowns
     covariance = fit.covariance()
     spread = np.sqrt(np.diag(covariance))
     vague = spread > np.array([unknown.kind.useful / unknown.kind.prior for unknown in problem.unknowns])
-    tied = np.abs(covariance) > TOGETHER * np.outer(spread, spread)
+    tied = np.abs(covariance) > 0.7 * np.outer(spread, spread)
     groups, left = [], set(np.flatnonzero(vague).tolist())
     while left:
         group: set[int] = set()

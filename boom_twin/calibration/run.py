@@ -21,10 +21,7 @@ from .fit import CalibrationProblem, Fit, InseparableUnknowns, fitted, groups_of
 from .sessions import STREAMS, MeasuredSession, Rigging, read_sessions, rest_periods
 from .unknowns import Choice, Unknown, assumed_of, unknowns_of, usual_names
 
-KEPT = 2.0 / 3.0  # of a single session is fitted, the rest held out
 BEYOND = 0.01  # m, by which a stroke may be beyond the travel of its cylinder
-MISFIT = 1.5  # of a channel, from which on it is remarked on
-GROWN = 1.1  # of residuals on what was held out, likewise
 BETWEEN = 1.96  # deviations, of a normal distribution's 95 %
 
 Progress = Callable[[float, str], None]
@@ -199,7 +196,7 @@ def _parts(sessions: Sequence[MeasuredSession]) -> tuple[int, list[tuple[Measure
     strokes = sessions[-1].series[Stream.STROKES].stamps
     if len(sessions) > 1:
         return int(strokes[0]), [(session, None) for session in sessions[:-1]]
-    until = int(strokes[0] + KEPT * (strokes[-1] - strokes[0]))
+    until = int(strokes[0] + 2.0 / 3.0 * (strokes[-1] - strokes[0]))
     return until, [(sessions[0], until)]
 
 
@@ -268,7 +265,7 @@ def _rms(values: Array) -> float:
 def _worse(before: HeldOutResult, after: HeldOutResult) -> str:
     """Return which residuals have grown on what was held out, and the remedy; empty if none has."""
     worse = [
-        name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > GROWN * max(old, 1.0)
+        name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > 1.1 * max(old, 1.0)
     ]
     if not worse:
         return ""
@@ -288,7 +285,7 @@ def _remarks(fit: Fit, names: Sequence[str], estimates: Sequence[Estimate], sess
                 "less, which no boom has. Check the zeros of the sensors and the other loads of the scene."
             )
     for name, misfit in zip(names, fit.misfits, strict=True):
-        if misfit > MISFIT:
+        if misfit > 1.5:
             found.append(
                 f"The readings of {name} are {misfit:.1f} times as far from the fit as its noise explains. The sessions hold "
                 "something that the parameters cannot make, as a fault of the sensor or another boom. It has the less weight."

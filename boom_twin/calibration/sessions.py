@@ -24,9 +24,7 @@ from ..scene.schema import Scene
 from ..types import NANO, SECOND, SENSORS, Array, Change, Mount, Place, Sample, Stream, StrokeReading, channels_of
 from .rest_filter import note_drives
 
-SHOWN = 12  # hex digits of a hash
 LOADS = ("payload", "line_fill")
-MISSING = 0.5  # largest share of values of a channel that may be missing
 
 
 @dataclass(frozen=True)
@@ -100,13 +98,13 @@ def _measured(session: Session, samples: SessionSamples, joints: int) -> Measure
             f"{session.path}: no usable value of {SENSORS[Stream.STROKES].named}_1..{joints} (met: {met}). "
             "Is it a session of this boom? If its sensors have other names, give a mapping."
         )
-    lacking = [f"cylinder_{i + 1}" for i in np.flatnonzero(np.isnan(series[Stream.STROKES].values).mean(axis=0) > MISSING)]
+    lacking = [f"cylinder_{i + 1}" for i in np.flatnonzero(np.isnan(series[Stream.STROKES].values).mean(axis=0) > 0.5)]
     if lacking:
         raise BagError(
             f"{session.path}: {', '.join(lacking)}: more than half of the values are missing. The scene has {joints} "
             "cylinders: give a session of this boom."
         )
-    return MeasuredSession(session.path.resolve().name, files_sha256(session)[:SHOWN], series, changed)
+    return MeasuredSession(session.path.resolve().name, files_sha256(session)[:12], series, changed)
 
 
 def _series(samples: list[Sample]) -> Series:
@@ -118,7 +116,6 @@ STREAMS = (Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES)  # compared
 LEAD, TAIL = 0.3, 0.4  # s, left out after valves closed, and before one is believed open
 TRAVEL = 2e-4  # m, of a drive, which ends a rest period
 SHORTEST, RESTED = 1.5, 5.0  # s, of a rest period, and of all of them
-LARGEST_GAP = 0.5  # s between strokes, which ends a rest period
 
 
 @dataclass(frozen=True)
@@ -173,7 +170,7 @@ def rest_periods(
 
 def _without_gaps(strokes: Series) -> list[Series]:
     """Return the stretches between gaps, each from its first complete reading on."""
-    cuts = np.flatnonzero(np.diff(strokes.stamps) * NANO > LARGEST_GAP) + 1
+    cuts = np.flatnonzero(np.diff(strokes.stamps) * NANO > 0.5) + 1  # s
     found = []
     for first, last in pairwise([0, *cuts, len(strokes.stamps)]):
         complete = np.flatnonzero(np.isfinite(strokes.values[first:last]).all(axis=1))

@@ -12,7 +12,6 @@ from ..scene.edit import parameter, parameter_names
 from ..scene.schema import Scene
 from ..types import Stream, channels_of, stream_of
 
-LEVER = 0.3  # m, of a cylinder about its joint
 LEAST_LOAD = 1e-3  # kg, kg/m; a load of nothing is another model
 
 
@@ -42,7 +41,7 @@ KINDS = {
 
 ZEROS = {
     Stream.ANGLES: UnknownKind("rad", math.radians(2.0), math.radians(0.05), least=ANGLE_ZERO),
-    Stream.STROKES: UnknownKind("m", 0.01, 5e-4, least=LEVER * ANGLE_ZERO),
+    Stream.STROKES: UnknownKind("m", 0.01, 5e-4, least=0.3 * ANGLE_ZERO),  # m, a lever
     Stream.IMU: UnknownKind("m/s^2", 0.3, 0.03),
 }
 """Kinds of the sensors' zeros, by stream, in the order in which they are estimated."""

@@ -22,7 +22,6 @@ from ..scene.edit import Edit, edited, merged
 from ..scene.schema import Scene
 from .deviation import Deviation, Response, StrokeCourse, answer, course_of, deviation, size, step_times, unknowns
 
-MOST_MODES = 6  # bending coordinates per flexible part that are tried
 Edits = Callable[[Scene, int], tuple[Edit, ...]]
 
 
@@ -121,7 +120,7 @@ def variants(scene: Scene) -> tuple[Variant, ...]:
     everywhere = range(len(scene.sections))
     wheres: list[Sequence[int]] = [everywhere, *([i] for i in everywhere if len(everywhere) > 1)]
     found = [without(scene, kind, where) for kind in KINDS for where in (wheres if kind.singly else wheres[:1])]
-    found += [with_modes(scene, count, where) for where in wheres for count in range(1, MOST_MODES + 1)]
+    found += [with_modes(scene, count, where) for where in wheres for count in range(1, 7)]
     if scene.clearance is not None and scene.clearance.pins:
         found.insert(0, Variant("all pins ideal", "clearance", (Edit(("clearance",), None),)))
     if scene.base.stiffness is not None:
@@ -142,7 +141,6 @@ def _named(owner: str, where: Sequence[int], count: int) -> str:
 
 
 GROUPS = 8  # sections are left out one by one up to so many; on a longer boom so many runs of neighbours
-TIMED_RUNS = 30
 
 Progress = Callable[[str], None]
 
@@ -175,7 +173,7 @@ def propose(full: Scene, most: float, start: Scene | None = None, progress: Prog
     lean = search.model()
     found = search.measured(search.edits)
     progress("measuring run times")
-    times = step_times((full, lean), search.course, TIMED_RUNS)
+    times = step_times((full, lean), search.course, 30)
     counts = (unknowns(full), unknowns(lean))
     return Proposal(lean, search.edits, found, search.course, counts, (float(times[0]), float(times[1])), search.next)
 

@@ -19,28 +19,68 @@ import numpy as np
 
 from ...errors import UsageError
 from ...scene.kinematics import gravity_in_base
-from ...scene.schema import Cylinder, CylinderPart, Pin, Scene
+from ...scene.schema import Cylinder, CylinderPart, Pin, RigidPart, Scene, Section
 from ...types import Array
-from . import exudyn, items, masses
+from . import exudyn, items
 from .linkages import Link, lump_masses, six_bar
-from .masses import Lump, Lumps
 from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
-from .system import Base, Boom, BuiltSection, Frame, Site, Station, oil_stiffness, section_frames
+from .system import (
+    Base,
+    Boom,
+    BuiltSection,
+    Frame,
+    Lump,
+    Lumps,
+    Site,
+    Station,
+    gather,
+    oil_stiffness,
+    section_frames,
+    uniform_rod,
+)
 
 SAME_PLACE = 1e-9  # m
 SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect; of the default boom's tip, shear is then 0.02 mm
+
+
+def _part(part: RigidPart | None) -> list[Lump]:
+    return [] if part is None else [Lump(part.mass, part.com, part.inertia)]
+
+
+def _tip(scene: Scene, index: int) -> list[Lump]:
+    if scene.tip is None or not scene.tip.payload or index != len(scene.sections) - 1:
+        return []
+    return [Lump(scene.tip.payload, (scene.sections[index].length, 0.0), 0.0)]
+
+
+def _rigid_section(scene: Scene, index: int) -> list[Lump]:
+    section = scene.sections[index]
+    beam = [] if section.beam is None else [uniform_rod(*section.beam, section.rho_A or 0.0, section.rho_I or 0.0)]
+    fill = uniform_rod(0.0, section.length, scene.line_fill or 0.0)
+    return [*_part(section.root), *_part(section.head), *beam, fill, *_tip(scene, index)]
+
+
+def _root(scene: Scene, section: Section, start: float) -> list[Lump]:
+    """Return the lumps inboard of a beam that begins at `start` (m): root and concrete."""
+    return [*_part(section.root), uniform_rod(0.0, start, scene.line_fill or 0.0)]
+
+
+def _head(scene: Scene, index: int, end: float) -> list[Lump]:
+    """Return the lumps outboard of a beam that ends at `end` (m): head, concrete and payload."""
+    section = scene.sections[index]
+    return [*_part(section.head), uniform_rod(end, section.length, scene.line_fill or 0.0), *_tip(scene, index)]
 
 
 def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSection:
     """Add section `index` (0-based) of about `elements` finite elements. A rigid frame carries every cylinder pin."""
     borne = boom.lumps.sections[index] if boom.lumps else {}
     if not boom.scene.is_flexible(index):
-        return BuiltSection(None, [_station(boom, frame, 0.0, masses.rigid_section(boom.scene, index), [*borne.values()])])
+        return BuiltSection(None, [_station(boom, frame, 0.0, _rigid_section(boom.scene, index), [*borne.values()])])
     section = boom.scene.sections[index]
     assert section.beam is not None
     inside = _places_on_beam(boom, index)
     places = [section.beam[0], *inside, section.beam[1]]
-    own = [masses.flexible_root(boom.scene, section), *([] for _ in inside), masses.flexible_head(boom.scene, index)]
+    own = [_root(boom.scene, section, places[0]), *([] for _ in inside), _head(boom.scene, index, places[-1])]
     near = {x: int(np.argmin([abs(x - place) for place in places])) for x in borne}
     stations = [
         _station(boom, frame, x, lumps, [borne[pin] for pin in borne if near[pin] == number])
@@ -54,8 +94,8 @@ def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSec
 
 
 def _station(boom: Boom, frame: Frame, x: float, own: list[Lump], borne: list[Lumps]) -> Station:
-    mass = masses.gather([*own, *(lump for lumps in borne for lump in lumps.inertia)], x)
-    weight = masses.gather([*own, *(lump for lumps in borne for lump in lumps.weight)], x) if borne else None
+    mass = gather([*own, *(lump for lumps in borne for lump in lumps.inertia)], x)
+    weight = gather([*own, *(lump for lumps in borne for lump in lumps.weight)], x) if borne else None
     node = boom.node(frame.point((x, 0.0)), frame.angle)
     return Station(x, node, boom.body(node, mass.mass, mass.com, mass.inertia, weight), frame.angle)
 
@@ -193,7 +233,7 @@ def _link(boom: Boom, link: Link, borne: Lumps | None = None) -> int:
     node = boom.node(np.array([link.frame.x, link.frame.y]), link.frame.angle)
     if borne is None:
         return boom.body(node, link.mass, link.lump.com, link.lump.inertia)
-    mass, weight = (masses.gather([link.lump, *lumps], 0.0) for lumps in (borne.inertia, borne.weight))
+    mass, weight = (gather([link.lump, *lumps], 0.0) for lumps in (borne.inertia, borne.weight))
     return boom.body(node, mass.mass, mass.com, mass.inertia, weight)
 
 

@@ -14,8 +14,6 @@ from ...types import Array
 from .faults import RigFault
 from .solve import Change
 
-JOURNAL = 0.025  # m, radius of a pin that the scene does not list
-
 
 def changes(scene: Scene, faults: Sequence[RigFault]) -> tuple[Scene, list[Change]]:
     """Return `scene` with the physical `faults` that are there at first, and its changes by those that come or go."""
@@ -53,7 +51,7 @@ def with_faults(scene: Scene, faults: Sequence[RigFault]) -> Scene:
 def _worn(scene: Scene, at: str, more: float) -> Scene:
     clearance = scene.clearance or Clearance()
     pins = {pin.at: pin for pin in clearance.pins}
-    pin = pins.get(at) or Pin(at=at, pin_radius=JOURNAL, radial_clearance=0.0)
+    pin = pins.get(at) or Pin(at=at, pin_radius=0.025, radial_clearance=0.0)
     pins[at] = pin.model_copy(update={"radial_clearance": pin.radial_clearance + more})
     return scene.model_copy(update={"clearance": clearance.model_copy(update={"pins": tuple(pins.values())})})
 

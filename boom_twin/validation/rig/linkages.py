@@ -17,8 +17,7 @@ import numpy as np
 
 from ...scene.schema import CylinderPart, Point, Scene
 from ...types import Array
-from .masses import Lump, LumpedMasses
-from .system import Frame
+from .system import Frame, Lump, LumpedMasses
 
 
 @dataclass(frozen=True, slots=True)

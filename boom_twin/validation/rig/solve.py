@@ -18,14 +18,9 @@ from ...scene.schema import Scene
 from ...types import Array
 from . import exudyn
 from .boom import SHEAR_OVER_AXIAL, build
-from .probes import Probes, attach, read
+from .probes import Probes
 from .stepping import Course, Effort, ParameterChanges, Scheme, step_through
 from .system import Boom, Site
-
-PASSES = 40
-LAST_INCREMENT = 1e-6  # m and rad, last increment; what is left is near its square
-LONGEST_INCREMENT = 0.2  # m and rad, in one pass
-NUDGE = 1e-5  # m and rad, of the difference quotient
 
 
 def find_equilibrium(system: Any, aim: str) -> None:
@@ -33,13 +28,13 @@ def find_equilibrium(system: Any, aim: str) -> None:
     residual, moving = _residual_of(system)
     data = system.systemData
     state = np.concatenate([data.GetODE2Coordinates(), data.GetAECoordinates()])
-    for _ in range(PASSES):
+    for _ in range(40):
         increment = np.linalg.solve(_tangent(residual, state, moving), -residual(state))
         longest = float(np.abs(increment[:moving]).max())
         if not np.isfinite(longest):
             break
-        state += increment * min(1.0, LONGEST_INCREMENT / max(longest, 1e-300))
-        if longest < LAST_INCREMENT:
+        state += increment * min(1.0, 0.2 / max(longest, 1e-300))  # m and rad
+        if longest < 1e-6:  # m and rad; what is left is near its square
             residual(state)
             data.SetODE2Coordinates(state[:moving], exudyn.ConfigurationType.Initial)
             return
@@ -68,7 +63,7 @@ def _tangent(residual: Any, state: Array, moving: int) -> Array:
     """Return the derivative of the residual. It is linear in the multipliers, which may be nudged by as much as 1 kN."""
     columns = np.empty((len(state), len(state)))
     for i in range(len(state)):
-        nudge, ahead, behind = NUDGE if i < moving else 1e3, state.copy(), state.copy()
+        nudge, ahead, behind = 1e-5 if i < moving else 1e3, state.copy(), state.copy()  # m and rad
         ahead[i] += nudge
         behind[i] -= nudge
         columns[:, i] = (residual(ahead) - residual(behind)) / (2 * nudge)
@@ -84,7 +79,7 @@ Change = tuple[Scene, Callable[[Array], Array]]
 
 
 def statics(scene: Scene, strokes: Array, elements: int = 16) -> dict[str, Array]:
-    """Return what `probes.read` gives of the equilibrium under gravity at absolute `strokes` (m), shape (n,).
+    """Return what `Probes.read` gives of the equilibrium under gravity at absolute `strokes` (m), shape (n,).
 
     There are no frequencies: Exudyn's eigenvalues lack the geometric stiffness.
     """
@@ -112,7 +107,7 @@ def simulate(
 
 @dataclass(frozen=True)
 class Resting:
-    """A boom in equilibrium, which may be moved from there any number of times; `rows` are of `probes.read`, one each."""
+    """A boom in equilibrium, which may be moved from there any number of times; `rows` are of `Probes.read`, one each."""
 
     boom: Boom
     probes: Probes
@@ -130,9 +125,9 @@ def at_rest(
 ) -> Resting:
     """Build the boom with its drives at `strokes` (m), shape (n,), and let it come to rest; see `build`."""
     boom = build(scene, strokes, elements, nodally_exact, lumped, shear_over_axial, sites)
-    probes = attach(boom)
+    probes = Probes(boom)
     settle(boom, strokes)
-    return Resting(boom, probes, read(boom, probes, at_rest=True))
+    return Resting(boom, probes, probes.read(at_rest=True))
 
 
 def move(
@@ -145,7 +140,7 @@ def move(
     load: TipLoad | None = None,
     changes: Sequence[Change] = (),
 ) -> tuple[dict[str, Array], Effort]:
-    """Integrate the motion of a boom at rest by a chosen scheme; return the rows of `probes.read`, and the effort.
+    """Integrate the motion of a boom at rest by a chosen scheme; return the rows of `Probes.read`, and the effort.
 
     ``drives`` (m, n) are added: strokes of the drives, m.
     """
@@ -156,7 +151,7 @@ def move(
     others = [(_built_alike(resting.boom, changed, strokes[0]), share(times)) for changed, share in changes]
     course = Course(strokes, rates, None if load is None else load(times), ParameterChanges(resting.boom, others))
     effort = step_through(resting.boom, course, step, output_step, scheme or Scheme())
-    found = read(resting.boom, resting.probes, at_rest=False)
+    found = resting.probes.read(at_rest=False)
     found["forces"][0] = resting.rows["forces"][0]  # Exudyn starts with zero multipliers: incompressible cylinders read zero
     found["t"] = _recorded_times(found["t"], times[::every])
     return found | {"drives": drive(found["t"])[0]}, effort

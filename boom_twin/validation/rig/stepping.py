@@ -21,9 +21,6 @@ from ...types import Array
 from . import exudyn
 from .system import Boom, oil_stiffness
 
-STEP_FORCE = 1e-6  # N, absolute tolerance of a step
-FEW = 3  # passes with a kept tangent, below which tangents are many
-
 
 @dataclass(frozen=True, slots=True)
 class Scheme:
@@ -150,19 +147,19 @@ def step_through(boom: Boom, course: Course, step: float, output_step: float, sc
 def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> Any:
     """Return Exudyn's settings. Its sparse solver was the fastest from 4 elements a section on, and no slower below.
 
-    A tangent that is made often keeps at least the pattern of its factors.
+    A tangent that is made often, kept for less than 3 passes, keeps at least the pattern of its factors.
     """
     settings = exudyn.SimulationSettings()
     settings.solution.file.write = False
     settings.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
-    settings.linearSolver.reuseAnalyzedPattern = scheme.kept < FEW
+    settings.linearSolver.reuseAnalyzedPattern = scheme.kept < 3
     settings.solution.sensors.writePeriod = output_step
     time_integration = settings.timeIntegration
     time_integration.numberOfSteps, time_integration.endTime = count, count * step
     time_integration.adaptiveStep = time_integration.automaticStepSize = False
     time_integration.verboseMode = 0
     newton = time_integration.newton
-    newton.relativeTolerance, newton.absoluteTolerance = scheme.tolerance, STEP_FORCE
+    newton.relativeTolerance, newton.absoluteTolerance = scheme.tolerance, 1e-6  # N
     newton.useModifiedNewton = scheme.kept > 0
     newton.maxModifiedNewtonIterations = max(0, scheme.kept - 1)
     time_integration.generalizedAlpha.spectralRadius = scheme.rho

@@ -24,7 +24,6 @@ from ...types import Array
 from .scenes import with_modes
 
 STEPS = (2.5e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 4e-2)  # s; every one divides the longest
-DEFAULT_STEP = 1e-3
 INTEGRATORS = (
     *(Method(parameter=rho) for rho in (0.0, 0.5, 0.9, 1.0)),
     Method("newmark", 0.5),
@@ -43,7 +42,7 @@ SCHEMES = ((1, 1e-4), (2, 1e-3), (0, 1e-3))
 class Own:
     """The transfer-matrix boom; `modes` None keeps the scene's."""
 
-    step: float = DEFAULT_STEP
+    step: float = 1e-3
     method: Method = field(default_factory=Method)
     modes: int | None = None
     basis: BasisName = "end-shapes"
@@ -144,7 +143,6 @@ def build() -> str:
 
 
 ROW = STEPS[-1]  # s between compared instants
-SHEAR_OVER_AXIAL = 160.0  # nearly rigid in shear, as in the scene
 
 
 @dataclass(frozen=True)
@@ -247,7 +245,7 @@ def _independent(rig: Any, scene: Scene, motion: Motion, quick: bool) -> Referen
 
 def at_rest(rig: Any, scene: Scene, strokes: Array, elements: int, lumped: bool) -> Any:
     """Return Exudyn's boom at rest without shear, with nodally exact beams; see `rig.at_rest`."""
-    return rig.at_rest(scene, strokes, elements, nodally_exact=True, lumped=lumped, shear_over_axial=SHEAR_OVER_AXIAL)
+    return rig.at_rest(scene, strokes, elements, nodally_exact=True, lumped=lumped, shear_over_axial=160.0)
 
 
 def _extrapolated(coarse: Array, finer: Array, longer: Array) -> Array:
@@ -257,7 +255,6 @@ def _extrapolated(coarse: Array, finer: Array, longer: Array) -> Array:
 
 REPEATS = 3  # in each of them
 BRIEF = 0.5  # s; a run of Exudyn that takes longer is not repeated within a round
-LONG = 2.0  # s; a run of Exudyn that takes longer is not repeated in another round
 
 
 @dataclass(frozen=True)
@@ -304,7 +301,7 @@ class Runner:
             for case in cases:
                 if turn == 0:
                     found[case] = self.row(case)
-                elif (row := found[case]).good and (isinstance(case, Own) or row.seconds * self.problem.motion.duration < LONG):
+                elif (row := found[case]).good and (isinstance(case, Own) or row.seconds * self.problem.motion.duration < 2.0):
                     found[case] = replace(row, seconds=min(row.seconds, self.row(case).seconds))
                 tick()
         return list(found.values())

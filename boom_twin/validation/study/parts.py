@@ -29,7 +29,6 @@ from ...types import Array
 from .report import page, table, write_json
 
 ROUNDS, QUICK_ROUNDS = 30, 5
-QUICK_DURATION = 2.0  # s
 HEAD = ("variant", "at rest, mm", "moving, mm", "f1, %", "time saved, %")
 
 
@@ -94,7 +93,7 @@ def _part(scene: Scene, variant: Variant, found: Response, time: float, full: Re
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
     """Measure in a move from `posture`; write parts.json and parts.md into the folder `out`; return their paths."""
-    course = course_of(scene, posture, QUICK_DURATION if quick else DURATION)
+    course = course_of(scene, posture, 2.0 if quick else DURATION)
     found = measure(scene, course, QUICK_ROUNDS if quick else ROUNDS)
     paths = [out / f"parts.{kind}" for kind in ("json", "md")]
     write_json(paths[0], as_json(found))

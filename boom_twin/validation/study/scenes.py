@@ -24,8 +24,6 @@ from ...scene.schema import Base, Cylinder, Joint, Scene, Section, Tip
 from ...scene.summary import mass_of
 from ...types import Array
 
-STEEL_LAG = 3e-3  # s, damping over stiffness of a cylinder that names no stiffness
-
 
 def with_modes(scene: Scene, count: int) -> Scene:
     """Return the scene with `count` bending coordinates in every flexible part; 0 makes all sections rigid."""
@@ -39,7 +37,7 @@ def cylinders(scene: Scene, stiffness: float | None) -> Scene:
         return with_rigid_cylinders(scene)
 
     def changed(cylinder: Cylinder) -> Cylinder:
-        lag = (cylinder.d or 0.0) / middle_stiffness(cylinder) if cylinder.is_compressible else STEEL_LAG
+        lag = (cylinder.d or 0.0) / middle_stiffness(cylinder) if cylinder.is_compressible else 3e-3  # s
         return cylinder.model_copy(update={"k": stiffness, "oil": None, "d": lag * stiffness})
 
     return _with_cylinders(scene, changed)
@@ -114,10 +112,8 @@ def _with_cylinders(scene: Scene, change: Callable[[Cylinder], Cylinder]) -> Sce
 
 
 STEEL, DENSITY, GRAVITY = 2.06e11, 7850.0, 9.81  # Pa, kg/m^3, m/s^2
-FEW = 7.0  # sections up to which the material is steel
 BENT, GIVEN_WAY = 0.1, 0.05  # rad in all: of the beams, of the cylinders, stretched out under gravity
 LIGHT, HEAVY = 40.0, 200.0  # kg/m at the tip, at the base
-LEVER = 0.15  # m/rad of a six-bar's cylinder, for a section of UNIT length
 UNIT = 3.3  # m, length of the section whose six-bars are copied
 REACH = 8.0  # deg that each joint can turn to either side of the posture
 SIX_BARS: dict[str, dict[str, Any]] = {
@@ -182,7 +178,7 @@ def _sizes(lengths: Array) -> _Sizes:
     per_metre = LIGHT + (HEAVY - LIGHT) * (1.0 - middles / total) ** 2
     mass = 1.5 * per_metre * lengths  # beam, rigid ends, links and cylinder
     moment = np.array([GRAVITY * mass[i:] @ (middles[i:] - (ends[i] - lengths[i])) for i in range(len(lengths))])
-    return _Sizes(lengths, per_metre, mass, moment, STEEL * max(1.0, len(lengths) / FEW) ** 2)
+    return _Sizes(lengths, per_metre, mass, moment, STEEL * max(1.0, len(lengths) / 7.0) ** 2)  # steel up to 7 sections
 
 
 def _section(sizes: _Sizes, i: int, base_scale: float) -> Section:
@@ -211,7 +207,7 @@ def _links(kind: str, scale: float, mass: float) -> dict[str, Any]:
 
 def _joint(kind: str, sizes: _Sizes, i: int, scale: float, angle: float, ground: tuple[Base, Section]) -> Joint:
     """Return joint `i` that turns `REACH` degrees to either side of `angle` (deg); `ground` carries cylinder 1."""
-    lever = 0.55 * scale if kind == "A" else LEVER * scale
+    lever = 0.55 * scale if kind == "A" else 0.15 * scale  # m/rad
     stiffness = sizes.moment[i] * len(sizes.length) / (GIVEN_WAY * lever**2)
     low, high = angle - REACH, angle + REACH
     part = {"mass": 0.06 * sizes.mass[i], "inertia": 0.06 * sizes.mass[i] * (0.2 * scale) ** 2, "com": 0.25 * scale}

@@ -36,7 +36,6 @@ METHODS: dict[str, Method] = {
     "single pass": Method(passes=1),
     "plain product": Method(product="plain"),
 }
-REFERENCE = Method(tolerance=1e-10)
 NOTHING = "there is no solution"
 FINER, FINEST = 8, 5e-6  # divisor of the step for the reference; its smallest step (s), below which round-off prevails
 
@@ -91,7 +90,7 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]
     if case.truth == "fine steps":
         step = max(setup.step / FINER, FINEST)
         every, stride = max(round(setup.step / step), 1), max(round(step / setup.step), 1)
-        right = _march(setup, step, every, REFERENCE)
+        right = _march(setup, step, every, Method(tolerance=1e-10))
         if right.status != "ok":
             return unsolvable, f"{NOTHING}: the reference ended, {right.status}"
         told = f"default method at {step:.3g} s"

@@ -19,8 +19,6 @@ from ...scene.schema import Scene
 from ...types import Array
 from . import scenes as made
 
-TRAVEL_SHARE = 0.05  # distance of the start from the end, over a cylinder's travel
-RANGE_SAMPLES = 1001  # angles over a joint's range
 FULL_STROKE = 10.0  # s, duration of a full stroke at full speed
 
 
@@ -102,9 +100,9 @@ def dead_stop(scene: Scene, step: float = 1e-3) -> Setup:
 
 def to_the_ends(scene: Scene, longest: bool) -> Setup:
     """Move all cylinders from near their longest or shortest allowed stroke to that stroke."""
-    ends = np.array([stroke_range(scene, i, RANGE_SAMPLES) for i in range(len(scene.joints))])
+    ends = np.array([stroke_range(scene, i, 1001) for i in range(len(scene.joints))])
     last, other = (ends[:, 1], ends[:, 0]) if longest else (ends[:, 0], ends[:, 1])
-    first = last + TRAVEL_SHARE * (other - last)
+    first = last + 0.05 * (other - last)
     move = Motion("to the ends", joint_angles_of_strokes(scene, first), first, last - first, 1.0, 2.0)
     return Setup(scene, move, move.angles, 2.0, 1e-3, 1.0)
 
@@ -138,7 +136,6 @@ STEPS = (  # step, rise, duration (s), share of the move
     (1e-6, 0.01, 0.02, 0.05), (1e-5, 0.05, 0.1, 0.05), (1e-4, 0.2, 0.4, 0.05), (1e-3, 1.0, 2.0, 1.0), (5e-3, 1.0, 2.0, 1.0),
     (2e-2, 2.0, 4.0, 1.0), (5e-2, 4.0, 8.0, 1.0),
 )  # fmt: skip
-COUNTS = (2, 3, 5, 10, 20, 50, 100, 200)
 PAYLOADS = (0.1, 1.0, 3.0, 10.0)
 MODE_COUNTS = (1, 2, 4, 6, 8, 10)
 HANGING = (0.0, -90.0, -90.0, -90.0)  # deg
@@ -193,7 +190,7 @@ def _steps(scene: Scene) -> Iterator[Case]:
 
 
 def _sections() -> Iterator[Case]:
-    for count in COUNTS:
+    for count in (2, 3, 5, 10, 20, 50, 100, 200):
         make = partial(_long, count)
         yield Case("length", f"{count} sections", "20 m in all, cylinder 1 moves, dt 1 ms", make, quick=count in (2, 20))
     yield Case("length", "101 m", "seven sections, cylinder 1 moves, dt 5 ms", partial(_large), quick=True)

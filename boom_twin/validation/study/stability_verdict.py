@@ -14,10 +14,7 @@ from ...types import Array
 
 Word = Literal["holds", "degrades", "fails", "refuses"]
 Mask = NDArray[np.bool_]
-QUIET = 1e-3  # fraction of the peak acceleration below which vibration counts as still
 IMPULSE = 0.05  # s after a speed jump in which accelerations and forces are not compared
-WRONG = 0.05  # fraction of the largest cylinder force above which forces are wrong after a jump
-SHORTEST_PATH = 1e-9  # m, least path of the tip used as divisor
 TINY = 1e-12  # m/s^2 or N, least divisor
 
 
@@ -110,10 +107,10 @@ def against_motion(found: MethodRun, right: MethodRun, still: float, jump: float
 
 
 def _lasting(found: MethodRun, right: MethodRun, jump: float, largest: float) -> float:
-    """Return the number of rows from a speed jump to the last wrong cylinder force; NaN without a jump."""
+    """Return the rows from a speed jump to the last cylinder force wrong by 5 % of the largest; NaN without a jump."""
     if math.isnan(jump):
         return math.nan
-    wrong = np.linalg.norm(found.cylinder_forces - right.cylinder_forces, axis=1) > WRONG * largest
+    wrong = np.linalg.norm(found.cylinder_forces - right.cylinder_forces, axis=1) > 0.05 * largest
     late = right.times[wrong & (right.times >= jump - 1e-9)]
     return float((late.max() - jump) / right.times[1]) if late.size else 0.0
 
@@ -139,12 +136,15 @@ def against_rest(found: MethodRun, equilibrium: Array | None, still: float) -> F
 
 
 def growth(motion: MethodRun, still: float) -> float:
-    """Return the ratio of tip acceleration vibration in the last quarter of the hold to the first; 1 if it is still."""
+    """Return the ratio of tip acceleration vibration in the last quarter of the hold to the first.
+
+    It is 1 for a boom that is still: below a thousandth of the largest acceleration.
+    """
     late = np.flatnonzero(motion.times > still)
     quarter = max(len(late) // 4, 1)
     first, last = (motion.tip_acceleration[rows] for rows in (late[:quarter], late[-quarter:]))
     before, after = (_rms(values - values.mean(0)) for values in (first, last))
-    if after <= QUIET * _largest(motion.tip_acceleration):
+    if after <= 1e-3 * _largest(motion.tip_acceleration):
         return 1.0
     return after / before if before > 0.0 else math.inf
 
@@ -176,7 +176,7 @@ def _rms(values: Array) -> float:
 
 def _path(motion: MethodRun) -> float:
     """Return the largest distance of the tip from its start, m."""
-    return max(_largest(motion.tip - motion.tip[0]), SHORTEST_PATH)
+    return max(_largest(motion.tip - motion.tip[0]), 1e-9)
 
 
 def _largest(values: Array) -> float:
