@@ -37,7 +37,6 @@ METHODS: dict[str, Method] = {
     "plain product": Method(product="plain"),
 }
 NOTHING = "there is no solution"
-FINER, FINEST = 8, 5e-6  # divisor of the step for the reference; its smallest step (s), below which round-off prevails
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,7 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]
     if case.truth == "none":
         return unsolvable, NOTHING
     if case.truth == "fine steps":
-        step = max(setup.step / FINER, FINEST)
+        step = max(setup.step / 8, 5e-6)  # s; in shorter steps round-off prevails
         every, stride = max(round(setup.step / step), 1), max(round(step / setup.step), 1)
         right = _march(setup, step, every, Method(tolerance=1e-10))
         if right.status != "ok":

@@ -136,10 +136,6 @@ STEPS = (  # step, rise, duration (s), share of the move
     (1e-6, 0.01, 0.02, 0.05), (1e-5, 0.05, 0.1, 0.05), (1e-4, 0.2, 0.4, 0.05), (1e-3, 1.0, 2.0, 1.0), (5e-3, 1.0, 2.0, 1.0),
     (2e-2, 2.0, 4.0, 1.0), (5e-2, 4.0, 8.0, 1.0),
 )  # fmt: skip
-PAYLOADS = (0.1, 1.0, 3.0, 10.0)
-MODE_COUNTS = (1, 2, 4, 6, 8, 10)
-HANGING = (0.0, -90.0, -90.0, -90.0)  # deg
-FOLDED = (80.0, -80.0, -240.0, -400.0)  # deg
 TEN_MINUTES, LARGE_STEP = 600.0, 2e-2  # s
 
 
@@ -160,7 +156,7 @@ def _stiffness(scene: Scene) -> Iterator[Case]:
         yield Case(group, f"k {short(k)} N/m", "all cylinders", make, quick=k in (STIFFNESSES[0], STIFFNESSES[-1]))
     yield Case(group, "incompressible", "cylinders without k", partial(smooth, made.cylinders(scene, None)), quick=True)
     group = "bending stiffness"
-    hanging = made.posed(made.bending(load_scene(), FACTORS[0]), HANGING)
+    hanging = made.posed(made.bending(load_scene(), FACTORS[0]), (0.0, -90.0, -90.0, -90.0))
     yield Case(group, "EI x 1e-3, hanging", "default boom, sections 2 to 4 hang", partial(smooth, hanging, "case", 0.4))
     for factor in FACTORS:
         make = partial(smooth, made.bending(scene, factor))
@@ -205,10 +201,10 @@ def _large() -> Setup:
 
 
 def _geometry(scene: Scene) -> Iterator[Case]:
-    group, boom = "geometry", load_scene()
+    group, folded = "geometry", made.posed(load_scene(), (80.0, -80.0, -240.0, -400.0))
     yield Case(group, "shortest strokes", "all cylinders go there", partial(to_the_ends, scene, False))
     yield Case(group, "longest strokes", "all cylinders go there", partial(to_the_ends, scene, True))
-    yield Case(group, "fully folded", "default boom", partial(smooth, made.posed(boom, FOLDED), "case", 0.3), quick=True)
+    yield Case(group, "fully folded", "default boom", partial(smooth, folded, "case", 0.3), quick=True)
 
 
 def _dead_centres() -> Iterator[Case]:
@@ -246,9 +242,9 @@ def _holds(scene: Scene) -> Iterator[Case]:
 
 
 def _payload_and_modes(scene: Scene) -> Iterator[Case]:
-    for share in PAYLOADS:
+    for share in (0.1, 1.0, 3.0, 10.0):
         make = partial(smooth, made.loaded(scene, share))
-        yield Case("payload", f"{share:g} x boom", "of the boom's mass, at the tip", make, quick=share == PAYLOADS[-1])
-    for count in MODE_COUNTS:
+        yield Case("payload", f"{share:g} x boom", "of the boom's mass, at the tip", make, quick=share == 10.0)
+    for count in (1, 2, 4, 6, 8, 10):
         make = partial(smooth, made.with_modes(scene, count))
-        yield Case("modes", f"{count} a part", "bending coordinates", make, quick=count == MODE_COUNTS[-1])
+        yield Case("modes", f"{count} a part", "bending coordinates", make, quick=count == 10)
