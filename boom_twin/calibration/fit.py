@@ -42,27 +42,9 @@ class Noise:
     channels: Array
 
 
-class RestingBoom:
-    """Boom of one trial of the unknowns, and its filter in a rest period; `zeros` (c,) are those of the channels, SI."""
-
-    def __init__(self, scene: Scene, zeros: Array, rigging: Rigging, gravity: Array) -> None:
-        self._boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads, rigging.places)
-        self._zeros, self._gravity, self._inclination = zeros, gravity, scene.base.inclination
-
-    def rest(self, period: RestPeriod) -> None:
-        """Put the boom to rest where it stands in a period."""
-        self._boom.start(period.strokes - self._zeros[: self._boom.plan.joints])
-        self._readings = period.times, period.channels, period.values - self._zeros[period.channels]
-
-    def filtered(self, loads: Array, sensors: Array, zero2: Array) -> tuple[Array, Array]:
-        """Return innovations of that period with their variances, (r, 2), and the zeros at its end; see `filter_rest`.
-
-        `loads` (2,) and `sensors` (c,) are variances of the fast load and of the sensors' noise.
-        """
-        found, zeros = np.empty((len(self._readings[0]), 2)), np.empty(len(zero2))
-        own = self._boom.posture, self._boom.filters
-        filter_rest(*own, loads, zero2, self._gravity, self._inclination, *self._readings, sensors, found, zeros)
-        return found, zeros
+RestFilter = Callable[[Array, Array, Array], tuple[Array, Array]]
+"""Variances of the fast load (2,), of the sensors' noise (c,), of zeros, see `filter_rest` -> innovations with their variances,
+(r, 2), and the zeros at the end of the rest period."""
 
 
 class CalibrationProblem:
@@ -98,10 +80,8 @@ class CalibrationProblem:
     def start(self) -> Array:
         """Return the deviations to start from: zeros of angle sensors and IMU that rest periods show one by one, shape (p,)."""
         usual = Noise(np.full((len(self._periods), 2), (USUAL * self._weight) ** 2), self.sensor_noise())
-        boom, seen = self.boom_at({}), []
-        for period, loads in zip(self._periods, usual.loads, strict=True):
-            boom.rest(period)
-            seen.append(boom.filtered(loads, usual.channels, self._zero2 + self._prior2)[1])
+        at_rest, pairs = self._boom_at({}), zip(self._periods, usual.loads, strict=True)
+        seen = [at_rest(period)(loads, usual.channels, self._zero2 + self._prior2)[1] for period, loads in pairs]
         zeros = dict(zip(self._zeroed, np.mean(seen, axis=0).tolist(), strict=True))
         return np.array([zeros.get(unknown.channel or "", 0.0) / unknown.kind.prior for unknown in self.unknowns])
 
@@ -113,31 +93,44 @@ class CalibrationProblem:
         """Return innovations and their variances, (r, 2), of several trials of parameters and zeros (SI, by name)."""
 
         def of(trial: dict[str, float]) -> Array:
-            boom, found = self.boom_at(trial), []
-            for period, loads in zip(self._periods, noise.loads, strict=True):
-                boom.rest(period)
-                found.append(boom.filtered(loads, noise.channels, self._zero2)[0])
-            return np.concatenate(found)
+            at_rest, pairs = self._boom_at(trial), zip(self._periods, noise.loads, strict=True)
+            return np.concatenate([at_rest(period)(loads, noise.channels, self._zero2)[0] for period, loads in pairs])
 
         with ThreadPoolExecutor(usable_cores()) as pool:
             return list(pool.map(of, trials))
 
-    def boom_at(self, trial: dict[str, float]) -> RestingBoom:
-        """Return the boom with the parameters of a trial, whose sensors read too much by its zeros."""
+    def _boom_at(self, trial: dict[str, float]) -> Callable[[RestPeriod], RestFilter]:
+        """Return a function that puts the boom of a trial to rest in a period, and returns its filter there.
+
+        The boom has the parameters of the trial, and its sensors read too much by the trial's zeros.
+        """
         scene = with_parameters(self.scene, {name: value for name, value in trial.items() if not name.endswith(".zero")})
-        zeros = np.array([trial.get(f"{name}.zero", 0.0) for name in self.names])
-        return RestingBoom(scene, zeros, self._rigging, self._gravity)
+        zeros, rigging = np.array([trial.get(f"{name}.zero", 0.0) for name in self.names]), self._rigging
+        boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads, rigging.places)
+
+        def at_rest(period: RestPeriod) -> RestFilter:
+            boom.start(period.strokes - zeros[: boom.plan.joints])
+            readings = period.times, period.channels, period.values - zeros[period.channels]
+
+            def filtered(loads: Array, sensors: Array, zero2: Array) -> tuple[Array, Array]:
+                found, ends = np.empty((len(period.times), 2)), np.empty(len(zero2))
+                own, axes = (boom.posture, boom.filters), (self._gravity, scene.base.inclination)
+                filter_rest(*own, loads, zero2, *axes, *readings, sensors, found, ends)
+                return found, ends
+
+            return filtered
+
+        return at_rest
 
     def noise(self, deviations: Array, sensors: Array) -> Noise:
         """Return the noise with the load of each rest period at its greatest likelihood; `sensors` (c,) is kept."""
         trial, bounds = self.values(deviations), np.log(np.array(LOADS) * self._weight)
 
         def most_likely(period: RestPeriod) -> Array:
-            boom = self.boom_at(trial)
-            boom.rest(period)
+            filtered = self._boom_at(trial)(period)
 
             def cost(sizes: Array) -> float:
-                return likelihood_cost(boom.filtered(np.exp(2.0 * sizes), sensors, self._zero2)[0])
+                return likelihood_cost(filtered(np.exp(2.0 * sizes), sensors, self._zero2)[0])
 
             exact = {"xatol": 0.15}  # of the logarithm of the size
             both = minimize_scalar(lambda size: cost(np.full(2, size)), bounds=bounds, method="bounded", options=exact).x

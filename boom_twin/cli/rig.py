@@ -120,7 +120,6 @@ def run(args: Namespace) -> int:
         Sensors,
         bundled,
         faults,
-        faulty_boom,
         loads,
         random_programme,
         through_postures,
@@ -141,7 +140,7 @@ def run(args: Namespace) -> int:
     wrong = [faults.parse(text) for text in args.fault]
     faults.check(wrong, scene, duration)
     _refuse_unrecorded([fault.cause for fault in wrong], recorded)
-    boom, changes = faulty_boom.changes(faulty_boom.wrong_by(scene, args.wrong, args.rig_seed), wrong)
+    boom, changes = faults.changes(faults.wrong_by(scene, args.wrong, args.rig_seed), wrong)
     pushing = [loads.parse(text) for text in args.load]
     loads.check(pushing, duration)
     load = loads.tip_load(scene, pushing, duration, args.seed) if pushing else None

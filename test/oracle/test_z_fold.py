@@ -13,8 +13,7 @@ from default_boom import examine_text, example_text, posture_angles, strokes_of_
 
 from boom_twin import simulate, statics
 from boom_twin.validation import rig
-from boom_twin.validation.rig.faults import parse
-from boom_twin.validation.rig.faulty_boom import changes, with_faults
+from boom_twin.validation.rig.faults import changes, parse, with_faults
 
 OIL = {"bore": 0.1, "rod": 0.07, "bulk_modulus": 1.5e9, "cap_line": 1e-3, "rod_line": 1e-3}
 

@@ -14,8 +14,7 @@ from default_boom import parameter, strokes_of_posture
 from boom_twin import Scene, UsageError, load_scene
 from boom_twin.scene.edit import parameter_names
 from boom_twin.validation.rig import Move, Programme, Sensors, record, simulate, statics
-from boom_twin.validation.rig.faults import parse
-from boom_twin.validation.rig.faulty_boom import changes, with_faults, wrong_by
+from boom_twin.validation.rig.faults import changes, parse, with_faults, wrong_by
 
 
 def ratios(changed: Scene, scene: Scene) -> dict[str, float]:
