@@ -37,7 +37,6 @@ class Effort:
 
     seconds: float  # CPU time of Exudyn's stepping alone
     passes: int  # of Newton's method
-    tangents: int  # made
 
 
 class ParameterChanges:
@@ -140,8 +139,7 @@ def step_through(boom: Boom, course: Course, step: float, output_step: float, sc
         boom.push(np.zeros(2))
         course.changes.restore()
     seconds = time.process_time() - begun
-    counted = boom.system.sys["dynamicSolver"].it
-    return Effort(seconds, int(counted.newtonStepsCount), int(counted.newtonJacobiCount))
+    return Effort(seconds, int(boom.system.sys["dynamicSolver"].it.newtonStepsCount))
 
 
 def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> Any:
