@@ -160,8 +160,6 @@ def likelihood_cost(found: Array) -> float:
 
 
 MOST = 12  # passes
-ENOUGH = 0.1  # standard deviations of the estimate, of a step
-NEAR = 1.0  # standard deviations of the estimate, of a step, from which on the noise is no more learnt
 
 
 @dataclass(frozen=True)
@@ -220,13 +218,13 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callab
         slopes = problem.slopes(at, noise, base)
         score, information = _score(slopes, base)
         precision, pull = information + np.eye(len(at)), score.sum(axis=1) - at
-        if furthest < ENOUGH or passes == MOST:
+        if furthest < 0.1 or passes == MOST:  # of the deviation of an estimate
             break
         step = bounded_minimum(precision, pull, problem.least - at)
         step /= max(1.0, float(np.abs(step).max()))  # one deviation of a prior at most
         step = _shortened(problem, at, step, noise, base)
         at, furthest = at + step, float((np.abs(step) / np.sqrt(np.diag(np.linalg.inv(precision)))).max())
-        if learning and furthest < NEAR:
+        if learning and furthest < 1.0:  # near enough to learn the noise for the last time
             noise = problem.noise(at, np.maximum(stated, stated * _mean_squares(problem, base)))
             learning = False
     sums = np.array([np.bincount(problem.blocks, row) for row in score])

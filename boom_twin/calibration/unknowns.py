@@ -12,8 +12,6 @@ from ..scene.edit import parameter, parameter_names
 from ..scene.schema import Scene
 from ..types import Stream, channels_of, stream_of
 
-LEAST_LOAD = 1e-3  # kg, kg/m; a load of nothing is another model
-
 
 @dataclass(frozen=True, slots=True)
 class UnknownKind:
@@ -80,8 +78,8 @@ class Unknown:
 
     @property
     def least(self) -> float:
-        """Lower bound in deviations from the present value; loads cannot be negative."""
-        return (LEAST_LOAD - self.present) / self.kind.prior if self.name in ("tip.payload", "line_fill") else -math.inf
+        """Lower bound in deviations from the present value; loads are 1 g at least, for none is another model."""
+        return (1e-3 - self.present) / self.kind.prior if self.name in ("tip.payload", "line_fill") else -math.inf
 
     def value(self, deviation: float) -> float:
         """Return the value at `deviation` prior deviations from the present one."""

@@ -99,7 +99,6 @@ BUNDLED_MOVES = (
 
 TIP_SPEED = 1.2  # m/s, bound of random programmes, by rigid kinematics
 RANGE_SAMPLES = 91  # of a joint's range
-MARGIN = 0.08  # of the range of a stroke, kept free at both ends
 HOLD, DURATION = (3.0, 8.0), (1.5, 6.0)  # s
 FIRST_HOLD = 3.0  # s
 
@@ -185,7 +184,7 @@ def _reachable(scene: Scene, now: Array, cylinders: list[int], span: float, rng:
         low, high = stroke_range(scene, i, RANGE_SAMPLES)
         if low >= high:
             raise UsageError(f"cylinder_{i + 1}: no stroke is within both max_stroke and range_deg. Widen one.")
-        free = MARGIN * (high - low)
+        free = 0.08 * (high - low)  # kept free at both ends
         aim[i] = rng.uniform(low + free, high - free)
     while True:
         trial = Programme(tuple(now.tolist()), tuple(Move(i, 0.0, span, float(aim[i])) for i in cylinders))

@@ -17,7 +17,6 @@ from ...types import Array
 from ..contact_law import HYSTERESIS, Contact, stiffness
 from . import exudyn
 
-SMOOTHING = 1e-6  # m, over which contact sets in
 HOLD = 1e10  # N/m, of a journal that is held in the middle
 
 
@@ -81,7 +80,7 @@ def contact_of(scene: Scene, pin: Pin) -> Contact:
 
     both = 2.0 / (1.0 / alone(scene.material) + 1.0 / alone(law.bush or scene.material))
     loss = HYSTERESIS[law.law](law.restitution)
-    return Contact(both, loss, pin.radial_clearance, law.exponent, SMOOTHING, law.friction)
+    return Contact(both, loss, pin.radial_clearance, law.exponent, 1e-6, law.friction)
 
 
 def refuse_other_pins(scene: Scene) -> None:

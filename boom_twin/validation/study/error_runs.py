@@ -34,8 +34,6 @@ INTEGRATORS = (
 )
 LUMPED_ELEMENTS = (1, 2, 3, 4)
 LUMPED_SCHEMES = ((1, 1e-3), (1, 5e-4), (1, 3e-4), (2, 3e-3), (2, 1e-3), (0, 1e-3))  # passes with a kept tangent, tolerance
-ELEMENTS = (4, 8, 16)
-SCHEMES = ((1, 1e-4), (2, 1e-3), (0, 1e-3))
 
 
 @dataclass(frozen=True)
@@ -122,7 +120,7 @@ def peer_cases(quick: bool) -> list[Peer]:
     if quick:
         return [Peer(step, elements, *LUMPED_SCHEMES[0]) for elements in LUMPED_ELEMENTS[1::2] for step in STEPS[2:6]]
     lumped = product(LUMPED_ELEMENTS, LUMPED_SCHEMES, STEPS[2:], (True,))
-    whole = product(ELEMENTS, SCHEMES, STEPS[1:], (False,))
+    whole = product((4, 8, 16), ((1, 1e-4), (2, 1e-3), (0, 1e-3)), STEPS[1:], (False,))
     return [Peer(step, n, kept, tolerance, lumps) for n, (kept, tolerance), step, lumps in (*lumped, *whole)]
 
 

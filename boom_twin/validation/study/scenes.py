@@ -111,7 +111,7 @@ def _with_cylinders(scene: Scene, change: Callable[[Cylinder], Cylinder]) -> Sce
     return _with_joints(scene, lambda joint: joint.model_copy(update={"cylinder": change(joint.cylinder)}))
 
 
-STEEL, DENSITY, GRAVITY = 2.06e11, 7850.0, 9.81  # Pa, kg/m^3, m/s^2
+DENSITY, GRAVITY = 7850.0, 9.81  # kg/m^3, m/s^2
 BENT, GIVEN_WAY = 0.1, 0.05  # rad in all: of the beams, of the cylinders, stretched out under gravity
 LIGHT, HEAVY = 40.0, 200.0  # kg/m at the tip, at the base
 UNIT = 3.3  # m, length of the section whose six-bars are copied
@@ -178,7 +178,8 @@ def _sizes(lengths: Array) -> _Sizes:
     per_metre = LIGHT + (HEAVY - LIGHT) * (1.0 - middles / total) ** 2
     mass = 1.5 * per_metre * lengths  # beam, rigid ends, links and cylinder
     moment = np.array([GRAVITY * mass[i:] @ (middles[i:] - (ends[i] - lengths[i])) for i in range(len(lengths))])
-    return _Sizes(lengths, per_metre, mass, moment, STEEL * max(1.0, len(lengths) / 7.0) ** 2)  # steel up to 7 sections
+    modulus = 2.06e11 * max(1.0, len(lengths) / 7.0) ** 2  # Pa, steel up to 7 sections
+    return _Sizes(lengths, per_metre, mass, moment, modulus)
 
 
 def _section(sizes: _Sizes, i: int, base_scale: float) -> Section:
