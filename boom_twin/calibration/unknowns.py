@@ -78,7 +78,7 @@ class Unknown:
 
     @property
     def least(self) -> float:
-        """Lower bound in deviations from the present value; loads are 1 g at least, for none is another model."""
+        """Lower bound in deviations from the present value; loads are 0.001 at least, for none is another model."""
         return (1e-3 - self.present) / self.kind.prior if self.name in ("tip.payload", "line_fill") else -math.inf
 
     def value(self, deviation: float) -> float:
