@@ -120,21 +120,18 @@ def run(args: Namespace) -> int:
         Sensors,
         bundled,
         faults,
-        faulty_boom,
         loads,
         random_programme,
         through_postures,
     )
     from ..validation.rig import record as record_session
-    from ..validation.rig.sensors import RATE
 
     assumed, out = scene_from(args.scene), Path(args.out)
     tell_oddities(assumed.oddities, assumed.source)
     scene = assumed.scene
     duration = BUNDLED_DURATION if args.duration is None else args.duration
     recorded = set(sensors_of(args.sensors))
-    rate = RATE if args.rate is None else args.rate
-    sensors = Sensors(rate)
+    sensors = Sensors() if args.rate is None else Sensors(args.rate)
     asked = (("imu", args.imu), ("moment", args.moment), ("point", args.point))
     places = {name: place for kind, texts in asked for name, place in named_places(kind, texts, scene).items()}
     cylinders = _cylinders(args.pressures, scene)
@@ -143,7 +140,7 @@ def run(args: Namespace) -> int:
     wrong = [faults.parse(text) for text in args.fault]
     faults.check(wrong, scene, duration)
     _refuse_unrecorded([fault.cause for fault in wrong], recorded)
-    boom, changes = faulty_boom.changes(faulty_boom.wrong_by(scene, args.wrong, args.rig_seed), wrong)
+    boom, changes = faults.changes(faults.wrong_by(scene, args.wrong, args.rig_seed), wrong)
     pushing = [loads.parse(text) for text in args.load]
     loads.check(pushing, duration)
     load = loads.tip_load(scene, pushing, duration, args.seed) if pushing else None

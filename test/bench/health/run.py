@@ -37,8 +37,7 @@ from boom_twin.health.alarms import Alarms
 from boom_twin.twin.blocks import ReportBlock, block_of
 from boom_twin.types import NANO, Stream
 from boom_twin.validation.rig import Scheme, Sensors, at_rest, move, observe, random_programme
-from boom_twin.validation.rig.faults import parse, spoil
-from boom_twin.validation.rig.faulty_boom import changes, wrong_by
+from boom_twin.validation.rig.faults import changes, parse, spoil, wrong_by
 from boom_twin.validation.rig.loads import PumpLoad, WindLoad, tip_load
 from boom_twin.validation.rig.motion import Programme
 

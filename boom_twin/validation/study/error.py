@@ -1,147 +1,128 @@
-"""Report and pictures of the study of error against run time (`boom_twin study error`)."""
+"""Study of error against run time (`boom_twin study error`): runs of all cases, their report and its picture."""
 
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from ....analysis.methods import DURATION, motion_of
-from ....offline.progress import progress_of
-from ....plots.study import Curve, Panel, work_precision_picture
-from ....plots.style import BLUE, ORANGE, SKY, TONES
-from ....scene.schema import Scene
-from ....system.atomic_files import write_atomic
-from ..report import page, table, write_json
-from .cases import PAPERS, Case, Own, Peer, own_cases, peer_cases
-from .problem import Problem, build, pose
-from .runner import EQUAL, ROUNDS, Measure, Row, Runner, acceleration, fastest, front, of, order, same_step, tip
+from ...analysis.methods import DURATION, motion_of
+from ...offline.progress import progress_of
+from ...plots.study import Curve, Panel, error_picture
+from ...scene.schema import Scene
+from ...system.atomic_files import write_atomic
+from .error_runs import PAPERS, Case, Own, Peer, Problem, Row, Runner, build, own_cases, peer_cases, pose
+from .report import page, table, write_json
 
-NOTE = "surrogate parameters; computed, not measured on a rig"
-OWN: dict[str, Any] = {"color": SKY, "linewidth": 0, "marker": ".", "markersize": 6}
-DEFAULT: dict[str, Any] = {"color": BLUE, "linewidth": 2.4, "marker": "o", "zorder": 5}
-EXUDYN: dict[str, Any] = {"color": ORANGE, "linewidth": 1.6, "marker": "s"}
+EQUAL = (0.3, 1.0, 3.0, 10.0)  # mm
+Measure = Callable[[Row], float]
+TIP: Measure = attrgetter("tip_mm")
+ACCELERATION: Measure = attrgetter("acceleration")
 
 
-def programs_picture(path: Path, problem: Problem, rows: Sequence[Row]) -> None:
+def of(rows: Sequence[Row], kind: type) -> list[Row]:
+    """Return the rows of one program: `Own` or `Peer`."""
+    return [row for row in rows if isinstance(row.case, kind)]
+
+
+def front(rows: Sequence[Row], error: Measure = TIP) -> list[Row]:
+    """Return the Pareto front, fastest first: no row is both faster and less wrong than one of these."""
+    found: list[Row] = []
+    for row in sorted((row for row in rows if row.good), key=lambda row: (row.seconds, error(row))):
+        if not found or error(row) < error(found[-1]):
+            found.append(row)
+    return found
+
+
+def fastest(rows: Sequence[Row], most: float) -> Row | None:
+    """Return the fastest row whose tip is wrong by at most `most` (mm)."""
+    return min((row for row in rows if row.good and row.tip_mm <= most), key=lambda row: row.seconds, default=None)
+
+
+def order(rows: Sequence[Row]) -> list[tuple[Row, float | None]]:
+    """Return rows of one method by falling step, each with the order of its own tip error from the step before."""
+    found: list[tuple[Row, float | None]] = []
+    for row in sorted(rows, key=lambda row: -row.case.step):
+        last = found[-1][0] if found else None
+        slope = None
+        if last is not None and last.good and row.good:
+            slope = math.log(last.own_mm / row.own_mm) / math.log(last.case.step / row.case.step)
+        found.append((row, slope))
+    return found
+
+
+def same_step(runner: Runner, rows: Sequence[Row], turns: int) -> dict[str, Any] | None:
+    """Run the default and Exudyn's fastest at its step that is exact enough in turn; None if none of its cases is.
+
+    Both meet the same machine so. Times are CPU seconds per simulated second of every run.
+    """
+    own = Own()
+    peers = [row for row in of(rows, Peer) if row.case.step == own.step]
+    most, best = next(((most, row) for most in EQUAL if (row := fastest(peers, most)) is not None), (EQUAL[-1], None))
+    if best is None or not isinstance(best.case, Peer):
+        return None
+    ours, theirs = zip(*((runner.row(own).seconds, runner.row(best.case).seconds) for _ in range(turns)), strict=True)
+    return {
+        "step_s": own.step, "elements": best.case.elements, "exudyn_method": best.case.label, "exudyn_error_at_most_mm": most,
+        "boom_twin_s": ours, "exudyn_s": theirs,
+        "ratio_of_medians": statistics.median(theirs) / statistics.median(ours),
+        "ratio_of_minima": min(theirs) / min(ours),
+    }  # fmt: skip
+
+
+def _draw(path: Path, problem: Problem, rows: Sequence[Row]) -> None:
     """Write errors of the tip and of its acceleration over run time; of each model of Exudyn, the front of its ways to step."""
     apart = problem.apart or (None, None)
     percent = None if apart[1] is None else 100.0 * apart[1]
     panels = (
-        _programs("Tip", "error of the tip, mm rms", rows, tip, apart[0]),
-        _programs(
+        _panel("Tip", "error of the tip, mm rms", rows, TIP, apart[0]),
+        _panel(
             "Tip acceleration",
             "error of the tip's acceleration, % of its rms",
             rows,
-            lambda row: 100.0 * acceleration(row),
+            lambda row: 100.0 * row.acceleration,
             percent,
         ),
     )
-    work_precision_picture(path, "Error against run time", NOTE, panels, (16.0, 10.4))
+    error_picture(path, "surrogate parameters; computed, not measured on a rig", panels)
 
 
-def _programs(title: str, label: str, rows: Sequence[Row], error: Measure, floor: float | None) -> Panel:
-    def points(chosen: Sequence[Row], name: str, look: dict[str, Any], notes: tuple[str, ...] = ()) -> Curve:
-        return Curve(name, tuple(row.seconds for row in chosen), tuple(error(row) for row in chosen), look, notes)
+def _panel(title: str, label: str, rows: Sequence[Row], error: Measure, floor: float | None) -> Panel:
+    def points(chosen: Sequence[Row], kind: str, notes: Sequence[str] = ()) -> Curve:
+        return Curve(kind, [row.seconds for row in chosen], [error(row) for row in chosen], notes)
 
-    own = _by_label(rows)
-    default = own.pop(Own().label, [])
-    others = [row for group in own.values() for row in group]
-    curves = [points(others, "boom_twin, all other methods", OWN)]
-    steps = tuple(f"{1e3 * row.case.step:g} ms" for row in default)
-    curves.append(points(default, "boom_twin, default method", DEFAULT, steps))
-    models: dict[str, list[Row]] = {}
-    for row in of(rows, Peer):
-        if isinstance(row.case, Peer):
-            models.setdefault(f"{row.case.elements}{' l' if row.case.lumped else ''}", []).append(row)
-    for model, group in models.items():
-        best = front(group, error)  # fastest first: its last row is the slow end, where the model is named
-        notes = (*[""] * (len(best) - 1), model)
-        curves.append(points(best, "Exudyn, by elements a section (l: lumped)", EXUDYN, notes))
-    best_of_all = tuple((row.seconds, error(row)) for row in front(rows, error))
-    return Panel(title, label, tuple(curves), best_of_all, _default(rows, error), floor)
-
-
-def methods_picture(path: Path, scene: Scene, rows: Sequence[Row]) -> None:
-    """Write own methods by what they vary, against the own reference."""
-    groups = {"Integrators": _varies_integrator, "Shapes a part": _varies_shapes, "Passes, product, beams": _varies_rest}
-    label = "error of the tip against the own reference, mm rms"
-    chosen = _default(rows, lambda row: row.own_mm)
-    panels = [Panel(title, label, _method_curves(scene, rows, choose), (), chosen) for title, choose in groups.items()]
-    work_precision_picture(path, "Methods of boom_twin: error against run time", NOTE, panels, (19.0, 10.0))
-
-
-def _method_curves(scene: Scene, rows: Sequence[Row], choose: Callable[[Own], bool]) -> tuple[Curve, ...]:
-    default, curves = Own().label, list[Curve]()
-    listed = [row for row in of(rows, Own) if isinstance(row.case, Own) and (choose(row.case) or row.case.label == default)]
-    for number, (label, group) in enumerate(_by_label(listed).items()):
-        case = group[0].case
-        assert isinstance(case, Own)
-        tone, dashed = number, number >= len(TONES)
-        if choose is _varies_shapes:
-            modes = case.modes or scene.modes
-            tone, dashed = modes - 1, case.basis == "cantilever"
-            label = f"{modes}, {'cantilever' if dashed else 'end shapes'}"
-        text = "as in the papers" if case == replace(PAPERS, step=case.step) else label.removeprefix(f"{default}, ")
-        look = _look(tone % len(TONES), dashed, case.label == default)
-        curves.append(Curve(text, tuple(row.seconds for row in group), tuple(row.own_mm for row in group), look))
-    return tuple(curves)
-
-
-def _look(tone: int, dashed: bool, bold: bool) -> dict[str, Any]:
-    colour, marker = TONES[tone]
-    return {
-        "color": colour, "marker": marker, "markersize": 7 if bold else 5.5, "linewidth": 2.6 if bold else 1.2,
-        "linestyle": (0, (4, 2)) if dashed else "-", "markerfacecolor": "white" if dashed else colour,
-        "zorder": 5 if bold else 3,
-    }  # fmt: skip
-
-
-def _varies_integrator(case: Own) -> bool:
-    return case == Own(case.step, case.method) and case.method.passes > 1 and case.method.product == "riccati"
-
-
-def _varies_shapes(case: Own) -> bool:
-    return case.modes is not None and case == Own(case.step, modes=case.modes, basis=case.basis)
-
-
-def _varies_rest(case: Own) -> bool:
-    lean = case.method.passes == 1 or case.method.product == "plain"
-    return lean or not (case.axial and case.geometric)
-
-
-def _by_label(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    groups: dict[str, list[Row]] = {}
-    for row in of(rows, Own):
-        if row.good:
-            groups.setdefault(row.case.label, []).append(row)
-    return groups
-
-
-def _default(rows: Sequence[Row], error: Measure) -> tuple[float, float] | None:
-    return next(((row.seconds, error(row)) for row in rows if row.case == Own() and row.good), None)
-
-
-QUICK_DURATION = 0.6  # s
-TURNS, QUICK_TURNS = 5, 2  # runs of each program at the same step
+    own = [row for row in of(rows, Own) if row.good]
+    default = [row for row in own if row.case.label == Own().label]
+    curves = [
+        points([row for row in own if row not in default], "other methods"),
+        points(default, "default method", [f"{1e3 * row.case.step:g} ms" for row in default]),
+    ]
+    peers = [(row, row.case) for row in rows if isinstance(row.case, Peer)]
+    for (elements, lumped), group in groupby(peers, lambda pair: (pair[1].elements, pair[1].lumped)):
+        best = front([row for row, _ in group], error)  # its last row is the slow end, where the model is named
+        curves.append(points(best, "Exudyn", [*[""] * (len(best) - 1), f"{elements}{' l' * lumped}"]))
+    chosen = next(((row.seconds, error(row)) for row in default if row.case == Own()), None)
+    return Panel(title, label, curves, points(front(rows, error), "Pareto front"), chosen, floor)
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
-    """Run all cases on a motion of `scene` from `posture`; write error.json, error.md and pictures; return the paths."""
-    problem = pose(scene, motion_of(scene, posture, QUICK_DURATION if quick else DURATION), quick)
+    """Run all cases on a motion of `scene` from `posture`; write error.json, error.md and error.png; return the paths."""
+    problem = pose(scene, motion_of(scene, posture, 0.6 if quick else DURATION), quick)
     cases: list[Case] = [*own_cases(scene, quick), *(peer_cases(quick) if problem.exudyn else ())]
-    runner, rounds = Runner(problem), 1 if quick else ROUNDS
+    runner, rounds = Runner(problem), 1 if quick else 5  # a case runs in every round; its time is that of the fastest run
     bar = progress_of(rounds * len(cases), "cases", "study error")
     rows = runner.rows(cases, rounds, lambda: bar.update(1))
     bar.close()
-    duel = same_step(runner, rows, QUICK_TURNS if quick else TURNS)
-    paths = [out / name for name in ("error.json", "error.md", "error.png", "error_methods.png")]
+    duel = same_step(runner, rows, 2 if quick else 5)
+    paths = [out / f"error.{kind}" for kind in ("json", "md", "png")]
     write_json(paths[0], _content(problem, rows, duel))
     write_atomic(paths[1], report(problem, rows, duel))
-    programs_picture(paths[2], problem, rows)
-    methods_picture(paths[3], scene, rows)
+    _draw(paths[2], problem, rows)
     return paths
 
 
@@ -156,8 +137,8 @@ def report(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -
         "Rows: the fastest case of each program within this error. Ratio: Exudyn's time over boom_twin's.",
         _equal(problem, rows), _at_same_step(duel),
         f"## Methods at a step of {1e3 * Own().step:g} ms",
-        "The first row is the default. Other rows name the difference. Other steps: picture below, `error.json`.",
-        _methods(rows), "![Methods of boom_twin](error_methods.png)",
+        "The first row is the default. Other rows name the difference. Other steps: `error.json`.",
+        _methods(rows),
     ]  # fmt: skip
     if failed := _failed(rows):
         parts += ["## What failed", failed]
@@ -257,7 +238,7 @@ def _name(row: Row) -> str:
 
 
 def _content(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -> dict[str, Any]:
-    fronts = {name: {id(row) for row in front(rows, error)} for name, error in (("tip", tip), ("acceleration", acceleration))}
+    fronts = {name: {id(row) for row in front(rows, error)} for name, error in (("tip", TIP), ("acceleration", ACCELERATION))}
     return {
         "motion": problem.motion.label,
         "references": {

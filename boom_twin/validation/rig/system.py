@@ -1,4 +1,4 @@
-"""Build the Exudyn system: nodes, rigid frames, markers, pins, weights, and where every part lies."""
+"""Build the Exudyn system: nodes, rigid frames, markers, pins, weights, where every part lies, and its mass."""
 
 from __future__ import annotations
 
@@ -8,12 +8,77 @@ from typing import Any
 
 import numpy as np
 
-from ....scene.kinematics import joint_angles_of_strokes
-from ....scene.schema import Cylinder, Point, Scene
-from ....types import Array
+from ...scene.kinematics import joint_angles_of_strokes
+from ...scene.schema import Cylinder, Point, Scene
+from ...types import Array
 from . import items
-from .masses import Gathered, LumpedMasses
 from .pin_clearance import Bush
+
+
+@dataclass(frozen=True, slots=True)
+class Lump:
+    """Rigid mass (kg) with centre (m) and inertia about that centre (kg m^2)."""
+
+    mass: float
+    com: Point
+    inertia: float
+
+
+@dataclass(frozen=True, slots=True)
+class Gathered:
+    """Merged mass (kg) with centre from, and inertia about, the REFERENCE POINT (m, kg m^2)."""
+
+    mass: float
+    com: Point
+    inertia: float
+
+
+@dataclass(slots=True)
+class Lumps:
+    """Lumps of neighbours on one body: `inertia` resists acceleration, `weight` has weight."""
+
+    inertia: list[Lump] = field(default_factory=list)
+    weight: list[Lump] = field(default_factory=list)
+
+    def both(self, lump: Lump) -> None:
+        """Add a lump with inertia and weight."""
+        self.inertia.append(lump)
+        self.weight.append(lump)
+
+
+@dataclass(frozen=True, slots=True)
+class LumpedMasses:
+    """Lumps that replace cylinders and links without a body of their own."""
+
+    sections: list[dict[float, Lumps]]  # lumps of every section by the pin's x (m), in the section's axes
+    links: list[Lumps]  # lumps on the bearing link of every joint, in its axes
+
+    @classmethod
+    def none(cls, count: int) -> LumpedMasses:
+        """Return lists without lumps for `count` sections."""
+        return cls([{} for _ in range(count)], [Lumps() for _ in range(count)])
+
+    def on_section(self, index: int, x: float) -> Lumps:
+        """Return the lumps that section `index` (0-based) bears at `x` (m)."""
+        return self.sections[index].setdefault(x, Lumps())
+
+
+def gather(lumps: list[Lump], reference_x: float) -> Gathered:
+    """Return all lumps as one rigid mass about the point (`reference_x`, 0) of the section's axes."""
+    mass = sum(lump.mass for lump in lumps)
+    if mass == 0.0:
+        return Gathered(0.0, (0.0, 0.0), sum(lump.inertia for lump in lumps))
+    x = sum(lump.mass * (lump.com[0] - reference_x) for lump in lumps) / mass
+    y = sum(lump.mass * lump.com[1] for lump in lumps) / mass
+    inertia = sum(lump.inertia + lump.mass * ((lump.com[0] - reference_x) ** 2 + lump.com[1] ** 2) for lump in lumps)
+    return Gathered(mass, (x, y), inertia)
+
+
+def uniform_rod(start: float, end: float, per_length: float, rotary: float = 0.0) -> Lump:
+    """Return a uniform rod on the section's axis: kg/m, and rotary inertia per length (kg m)."""
+    length = end - start
+    mass = per_length * length
+    return Lump(mass, ((start + end) / 2, 0.0), mass * length**2 / 12 + rotary * length)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,30 +1,119 @@
-"""Long booms for studies: valid scenes of any number of sections made to one recipe.
+"""Scenes for studies: a scene with one thing changed, and long booms of any number of sections made to one recipe.
 
-Joint 1 is of kind A, the others are six-bars, all geometrically similar to those of the default scene. Second moments and oil
-stiffnesses follow the static moments of the boom stretched out horizontally, so that every boom bends and gives by the same
-angles in all. Six-bars of short sections are low, so their cylinders push along the beams with forces that grow with the number
-of sections: the made-up material gets stiffer to match. The numbers describe no real machine.
+Joint 1 of a long boom is of kind A, the others are six-bars, all geometrically similar to those of the default scene. Second
+moments and oil stiffnesses follow the static moments of the boom stretched out horizontally, so that every boom bends and gives
+by the same angles in all. Six-bars of short sections are low, so their cylinders push along the beams with forces that grow
+with the number of sections: the made-up material gets stiffer to match. The numbers describe no real machine.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...kernels.elements.linkage import cylinder_length
+from ...reduction import search
+from ...scene.edit import scaled, with_rigid_cylinders
 from ...scene.kinematics import linkage_of
-from ...scene.schema import Base, Joint, Scene, Section
+from ...scene.oil_spring import middle_stiffness
+from ...scene.schema import Base, Cylinder, Joint, Scene, Section, Tip
+from ...scene.summary import mass_of
 from ...types import Array
 
-STEEL, DENSITY, GRAVITY = 2.06e11, 7850.0, 9.81  # Pa, kg/m^3, m/s^2
-FEW = 7.0  # sections up to which the material is steel
+
+def with_modes(scene: Scene, count: int) -> Scene:
+    """Return the scene with `count` bending coordinates in every flexible part; 0 makes all sections rigid."""
+    variant = search.with_modes(scene, count, range(len(scene.sections)))
+    return scene if variant is None else variant.of(scene)
+
+
+def cylinders(scene: Scene, stiffness: float | None) -> Scene:
+    """Return the scene with this oil stiffness (N/m) of all cylinders, damping in proportion; None: incompressible."""
+    if stiffness is None:
+        return with_rigid_cylinders(scene)
+
+    def changed(cylinder: Cylinder) -> Cylinder:
+        lag = (cylinder.d or 0.0) / middle_stiffness(cylinder) if cylinder.is_compressible else 3e-3  # s
+        return cylinder.model_copy(update={"k": stiffness, "oil": None, "d": lag * stiffness})
+
+    return _with_cylinders(scene, changed)
+
+
+def bending(scene: Scene, factor: float) -> Scene:
+    """Return the scene with `factor` times the second moment of area of all sections."""
+    return _with_sections(scene, lambda s: s if s.I is None else s.model_copy(update={"I": factor * s.I}))
+
+
+def links(scene: Scene, factor: float) -> Scene:
+    """Return the scene with `factor` times the masses of its links."""
+
+    def changed(joint: Joint) -> Joint:
+        masses = {key: getattr(joint, key) for key in ("mL", "mR")}
+        return joint.model_copy(update={key: factor * mass for key, mass in masses.items() if mass is not None})
+
+    return _with_joints(scene, changed)
+
+
+def cylinder_parts(scene: Scene, keys: tuple[str, ...], factor: float) -> Scene:
+    """Return the scene with `factor` times mass and inertia of its barrels, rods or both (`keys`)."""
+
+    def changed(cylinder: Cylinder) -> Cylinder:
+        parts = {key: getattr(cylinder, key) for key in keys}
+        return cylinder.model_copy(update={key: scaled(part, factor) for key, part in parts.items() if part is not None})
+
+    return _with_cylinders(scene, changed)
+
+
+def loaded(scene: Scene, share: float) -> Scene:
+    """Return the scene with a payload of `share` times the boom's mass."""
+    mass = mass_of(scene.model_copy(update={"tip": None}))
+    return scene.model_copy(update={"tip": Tip(payload=share * mass)})
+
+
+def undamped(scene: Scene) -> Scene:
+    """Return the scene without damping in beams and cylinders."""
+    calm = _with_sections(scene, lambda section: section.model_copy(update={"beta": None}))
+    return _with_cylinders(calm, lambda cylinder: cylinder.model_copy(update={"d": None}))
+
+
+def posed(scene: Scene, headings: tuple[float, ...]) -> Scene:
+    """Return the scene with a posture ``case`` at section angles `headings` (deg)."""
+    return scene.model_copy(update={"postures": {"case": headings}})
+
+
+def freed(scene: Scene, index: int, low: float, travel: float, relative: float) -> Scene:
+    """Return the scene whose joint `index` may turn down to `low` (deg) with a cylinder of `travel` (m).
+
+    In the posture ``case`` that joint stands at `relative` (deg), the others as in the posture ``arch``.
+    """
+    joint = scene.joints[index]
+    cylinder = joint.cylinder.model_copy(update={"max_stroke": travel})
+    wide = joint.model_copy(update={"range_deg": (low, joint.range_deg[1]), "cylinder": cylinder})
+    turned = np.diff(scene.postures["arch"], prepend=0.0)
+    turned[index] = relative
+    joints = tuple(wide if i == index else other for i, other in enumerate(scene.joints))
+    return posed(scene.model_copy(update={"joints": joints}), tuple(float(angle) for angle in np.cumsum(turned)))
+
+
+def _with_sections(scene: Scene, change: Callable[[Section], Section]) -> Scene:
+    return scene.model_copy(update={"sections": tuple(change(section) for section in scene.sections)})
+
+
+def _with_joints(scene: Scene, change: Callable[[Joint], Joint]) -> Scene:
+    return scene.model_copy(update={"joints": tuple(change(joint) for joint in scene.joints)})
+
+
+def _with_cylinders(scene: Scene, change: Callable[[Cylinder], Cylinder]) -> Scene:
+    return _with_joints(scene, lambda joint: joint.model_copy(update={"cylinder": change(joint.cylinder)}))
+
+
+DENSITY, GRAVITY = 7850.0, 9.81  # kg/m^3, m/s^2
 BENT, GIVEN_WAY = 0.1, 0.05  # rad in all: of the beams, of the cylinders, stretched out under gravity
 LIGHT, HEAVY = 40.0, 200.0  # kg/m at the tip, at the base
-LEVER = 0.15  # m/rad of a six-bar's cylinder, for a section of UNIT length
 UNIT = 3.3  # m, length of the section whose six-bars are copied
 REACH = 8.0  # deg that each joint can turn to either side of the posture
 SIX_BARS: dict[str, dict[str, Any]] = {
@@ -89,7 +178,8 @@ def _sizes(lengths: Array) -> _Sizes:
     per_metre = LIGHT + (HEAVY - LIGHT) * (1.0 - middles / total) ** 2
     mass = 1.5 * per_metre * lengths  # beam, rigid ends, links and cylinder
     moment = np.array([GRAVITY * mass[i:] @ (middles[i:] - (ends[i] - lengths[i])) for i in range(len(lengths))])
-    return _Sizes(lengths, per_metre, mass, moment, STEEL * max(1.0, len(lengths) / FEW) ** 2)
+    modulus = 2.06e11 * max(1.0, len(lengths) / 7.0) ** 2  # Pa, steel up to 7 sections
+    return _Sizes(lengths, per_metre, mass, moment, modulus)
 
 
 def _section(sizes: _Sizes, i: int, base_scale: float) -> Section:
@@ -118,7 +208,7 @@ def _links(kind: str, scale: float, mass: float) -> dict[str, Any]:
 
 def _joint(kind: str, sizes: _Sizes, i: int, scale: float, angle: float, ground: tuple[Base, Section]) -> Joint:
     """Return joint `i` that turns `REACH` degrees to either side of `angle` (deg); `ground` carries cylinder 1."""
-    lever = 0.55 * scale if kind == "A" else LEVER * scale
+    lever = 0.55 * scale if kind == "A" else 0.15 * scale  # m/rad
     stiffness = sizes.moment[i] * len(sizes.length) / (GIVEN_WAY * lever**2)
     low, high = angle - REACH, angle + REACH
     part = {"mass": 0.06 * sizes.mass[i], "inertia": 0.06 * sizes.mass[i] * (0.2 * scale) ** 2, "com": 0.25 * scale}

@@ -9,15 +9,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ....analysis.methods import MethodRun
-from ....types import Array
+from ...analysis.methods import MethodRun
+from ...types import Array
 
 Word = Literal["holds", "degrades", "fails", "refuses"]
 Mask = NDArray[np.bool_]
-QUIET = 1e-3  # fraction of the peak acceleration below which vibration counts as still
 IMPULSE = 0.05  # s after a speed jump in which accelerations and forces are not compared
-WRONG = 0.05  # fraction of the largest cylinder force above which forces are wrong after a jump
-SHORTEST_PATH = 1e-9  # m, least path of the tip used as divisor
 TINY = 1e-12  # m/s^2 or N, least divisor
 
 
@@ -110,23 +107,23 @@ def against_motion(found: MethodRun, right: MethodRun, still: float, jump: float
 
 
 def _lasting(found: MethodRun, right: MethodRun, jump: float, largest: float) -> float:
-    """Return the number of rows from a speed jump to the last wrong cylinder force; NaN without a jump."""
+    """Return the rows from a speed jump to the last cylinder force wrong by 5 % of the largest; NaN without a jump."""
     if math.isnan(jump):
         return math.nan
-    wrong = np.linalg.norm(found.cylinder_forces - right.cylinder_forces, axis=1) > WRONG * largest
+    wrong = np.linalg.norm(found.cylinder_forces - right.cylinder_forces, axis=1) > 0.05 * largest
     late = right.times[wrong & (right.times >= jump - 1e-9)]
     return float((late.max() - jump) / right.times[1]) if late.size else 0.0
 
 
-def against_rest(found: MethodRun, equilibrium: Array | None, still: float, every: int = 1) -> Facts:
+def against_rest(found: MethodRun, equilibrium: Array | None, still: float) -> Facts:
     """Return the deviations at the end of a long hold from the tip's `equilibrium` (m), shape (2,).
 
-    If that is None, drift is the shift of the mean over the hold. `every` is the number of steps per row; ringing needs 1.
+    If that is None, drift is the shift of the mean over the hold.
     """
     late = np.flatnonzero(found.times > still)
     first, last = late[: len(late) // 4], late[-(len(late) // 4) :]
     away = found.tip[-1] - equilibrium if equilibrium is not None else found.tip[last].mean(0) - found.tip[first].mean(0)
-    ringing = _rings(found, None, found.times > still) if every == 1 else (math.nan, math.nan)
+    ringing = _rings(found, None, found.times > still)
     return Facts(
         found.status,
         doubt=found.doubt,
@@ -139,12 +136,15 @@ def against_rest(found: MethodRun, equilibrium: Array | None, still: float, ever
 
 
 def growth(motion: MethodRun, still: float) -> float:
-    """Return the ratio of tip acceleration vibration in the last quarter of the hold to the first; 1 if it is still."""
+    """Return the ratio of tip acceleration vibration in the last quarter of the hold to the first.
+
+    It is 1 for a boom that is still: below a thousandth of the largest acceleration.
+    """
     late = np.flatnonzero(motion.times > still)
     quarter = max(len(late) // 4, 1)
     first, last = (motion.tip_acceleration[rows] for rows in (late[:quarter], late[-quarter:]))
     before, after = (_rms(values - values.mean(0)) for values in (first, last))
-    if after <= QUIET * _largest(motion.tip_acceleration):
+    if after <= 1e-3 * _largest(motion.tip_acceleration):
         return 1.0
     return after / before if before > 0.0 else math.inf
 
@@ -176,7 +176,7 @@ def _rms(values: Array) -> float:
 
 def _path(motion: MethodRun) -> float:
     """Return the largest distance of the tip from its start, m."""
-    return max(_largest(motion.tip - motion.tip[0]), SHORTEST_PATH)
+    return max(_largest(motion.tip - motion.tip[0]), 1e-9)
 
 
 def _largest(values: Array) -> float:

@@ -11,14 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import UsageError
-from ....scene.schema import Material, Pin, Scene
-from ....types import Array
-from ...contact_law import HYSTERESIS, Contact, stiffness
+from ...errors import UsageError
+from ...scene.schema import Material, Pin, Scene
+from ...types import Array
+from ..contact_law import HYSTERESIS, Contact, stiffness
 from . import exudyn
 
-LEAST_GAP = 3e-5  # m, of the radii in K, which grows without bound while the pin becomes ideal
-SMOOTHING = 1e-6  # m, over which contact sets in
 HOLD = 1e10  # N/m, of a journal that is held in the middle
 
 
@@ -78,11 +76,11 @@ def contact_of(scene: Scene, pin: Pin) -> Contact:
     law = scene.clearance.contact
 
     def alone(material: Material) -> float:
-        return stiffness(pin.pin_radius, max(pin.radial_clearance, LEAST_GAP), material.E, material.nu)
+        return stiffness(pin.pin_radius, max(pin.radial_clearance, 3e-5), material.E, material.nu)  # m
 
     both = 2.0 / (1.0 / alone(scene.material) + 1.0 / alone(law.bush or scene.material))
     loss = HYSTERESIS[law.law](law.restitution)
-    return Contact(both, loss, pin.radial_clearance, law.exponent, SMOOTHING, law.friction)
+    return Contact(both, loss, pin.radial_clearance, law.exponent, 1e-6, law.friction)
 
 
 def refuse_other_pins(scene: Scene) -> None:

@@ -3,7 +3,7 @@
 The model shares no equation with the twin. Every node holds absolute x, y and rotation in the base's axes; the rigid
 root and head of a section sit on the end nodes of its beam, so they add no unknowns. A part that the scene does not
 name has no mass here; massless links stay as bodies, held by as many constraints as they have unknowns. A lumped boom
-has no bodies for cylinders and two-force links; see `lumped_masses`.
+has no bodies for cylinders and two-force links; see `linkages`.
 
 Sources: J. Simo and L. Vu-Quoc, "On the dynamics of flexible beams under large overall motions - the plane case",
 J. Appl. Mech. 53 (1986), for the beam; Exudyn (J. Gerstmayr) for everything that is solved.
@@ -17,31 +17,70 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import UsageError
-from ....scene.kinematics import gravity_in_base
-from ....scene.schema import Cylinder, CylinderPart, Pin, Scene
-from ....types import Array
-from . import exudyn, items, masses
-from .lumped_masses import lump_masses
-from .masses import Lump, Lumps
+from ...errors import UsageError
+from ...scene.kinematics import gravity_in_base
+from ...scene.schema import Cylinder, CylinderPart, Pin, RigidPart, Scene, Section
+from ...types import Array
+from . import exudyn, items
+from .linkages import Link, lump_masses, six_bar
 from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
-from .six_bar import Link, six_bar
-from .system import Base, Boom, BuiltSection, Frame, Site, Station, oil_stiffness, section_frames
+from .system import (
+    Base,
+    Boom,
+    BuiltSection,
+    Frame,
+    Lump,
+    Lumps,
+    Site,
+    Station,
+    gather,
+    oil_stiffness,
+    section_frames,
+    uniform_rod,
+)
 
 SAME_PLACE = 1e-9  # m
 SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect; of the default boom's tip, shear is then 0.02 mm
+
+
+def _part(part: RigidPart | None) -> list[Lump]:
+    return [] if part is None else [Lump(part.mass, part.com, part.inertia)]
+
+
+def _tip(scene: Scene, index: int) -> list[Lump]:
+    if scene.tip is None or not scene.tip.payload or index != len(scene.sections) - 1:
+        return []
+    return [Lump(scene.tip.payload, (scene.sections[index].length, 0.0), 0.0)]
+
+
+def _rigid_section(scene: Scene, index: int) -> list[Lump]:
+    section = scene.sections[index]
+    beam = [] if section.beam is None else [uniform_rod(*section.beam, section.rho_A or 0.0, section.rho_I or 0.0)]
+    fill = uniform_rod(0.0, section.length, scene.line_fill or 0.0)
+    return [*_part(section.root), *_part(section.head), *beam, fill, *_tip(scene, index)]
+
+
+def _root(scene: Scene, section: Section, start: float) -> list[Lump]:
+    """Return the lumps inboard of a beam that begins at `start` (m): root and concrete."""
+    return [*_part(section.root), uniform_rod(0.0, start, scene.line_fill or 0.0)]
+
+
+def _head(scene: Scene, index: int, end: float) -> list[Lump]:
+    """Return the lumps outboard of a beam that ends at `end` (m): head, concrete and payload."""
+    section = scene.sections[index]
+    return [*_part(section.head), uniform_rod(end, section.length, scene.line_fill or 0.0), *_tip(scene, index)]
 
 
 def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSection:
     """Add section `index` (0-based) of about `elements` finite elements. A rigid frame carries every cylinder pin."""
     borne = boom.lumps.sections[index] if boom.lumps else {}
     if not boom.scene.is_flexible(index):
-        return BuiltSection(None, [_station(boom, frame, 0.0, masses.rigid_section(boom.scene, index), [*borne.values()])])
+        return BuiltSection(None, [_station(boom, frame, 0.0, _rigid_section(boom.scene, index), [*borne.values()])])
     section = boom.scene.sections[index]
     assert section.beam is not None
     inside = _places_on_beam(boom, index)
     places = [section.beam[0], *inside, section.beam[1]]
-    own = [masses.flexible_root(boom.scene, section), *([] for _ in inside), masses.flexible_head(boom.scene, index)]
+    own = [_root(boom.scene, section, places[0]), *([] for _ in inside), _head(boom.scene, index, places[-1])]
     near = {x: int(np.argmin([abs(x - place) for place in places])) for x in borne}
     stations = [
         _station(boom, frame, x, lumps, [borne[pin] for pin in borne if near[pin] == number])
@@ -55,8 +94,8 @@ def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSec
 
 
 def _station(boom: Boom, frame: Frame, x: float, own: list[Lump], borne: list[Lumps]) -> Station:
-    mass = masses.gather([*own, *(lump for lumps in borne for lump in lumps.inertia)], x)
-    weight = masses.gather([*own, *(lump for lumps in borne for lump in lumps.weight)], x) if borne else None
+    mass = gather([*own, *(lump for lumps in borne for lump in lumps.inertia)], x)
+    weight = gather([*own, *(lump for lumps in borne for lump in lumps.weight)], x) if borne else None
     node = boom.node(frame.point((x, 0.0)), frame.angle)
     return Station(x, node, boom.body(node, mass.mass, mass.com, mass.inertia, weight), frame.angle)
 
@@ -194,7 +233,7 @@ def _link(boom: Boom, link: Link, borne: Lumps | None = None) -> int:
     node = boom.node(np.array([link.frame.x, link.frame.y]), link.frame.angle)
     if borne is None:
         return boom.body(node, link.mass, link.lump.com, link.lump.inertia)
-    mass, weight = (masses.gather([link.lump, *lumps], 0.0) for lumps in (borne.inertia, borne.weight))
+    mass, weight = (gather([link.lump, *lumps], 0.0) for lumps in (borne.inertia, borne.weight))
     return boom.body(node, mass.mass, mass.com, mass.inertia, weight)
 
 
@@ -254,7 +293,7 @@ def build(
     """Build the undeformed boom with its drives at absolute `strokes` (m), shape (n,). Sensors may still be added.
 
     A flexible section has `elements` finite elements, at least one per part between cylinder brackets. `nodally_exact`: few
-    elements bend as many do, see `shear_stiffness`. `lumped`: see `lumped_masses`; it needs ideal pins and a rigid base.
+    elements bend as many do, see `shear_stiffness`. `lumped`: see `linkages`; it needs ideal pins and a rigid base.
     Sensors are at `sites`. UsageError for worn pins other than of rods, and for a lumped boom that cannot be.
     """
     refuse_other_pins(scene)

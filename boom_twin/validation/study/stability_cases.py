@@ -10,17 +10,14 @@ from typing import Literal
 
 import numpy as np
 
-from ....analysis.methods import Drive, Motion, motion_of
-from ....scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
-from ....scene.load import load_scene
-from ....scene.pump_pulses import ease
-from ....scene.schema import Scene
-from ....types import Array
-from .. import scene_changes as made
-from ..long_booms import long_boom, seven_sections
+from ...analysis.methods import Drive, Motion, motion_of
+from ...scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
+from ...scene.load import load_scene
+from ...scene.pump_pulses import ease
+from ...scene.schema import Scene
+from ...types import Array
+from . import scenes as made
 
-TRAVEL_SHARE = 0.05  # distance of the start from the end, over a cylinder's travel
-RANGE_SAMPLES = 1001  # angles over a joint's range
 FULL_STROKE = 10.0  # s, duration of a full stroke at full speed
 
 
@@ -34,7 +31,6 @@ class Setup:
     duration: float  # s
     step: float
     still: float  # time (s) after which the drives stand still
-    every: int = 1  # steps per row
     jump: float = math.nan  # time (s) of a jump in speed, or NaN; accelerations and forces are impulses there, without a value
 
 
@@ -62,13 +58,12 @@ def ease_integral(x: Array) -> Array:
 
 
 def smooth(
-    scene: Scene, posture: str | None = None, share: float = 1.0, rise: float = 1.0, duration: float = 2.0, step: float = 1e-3,
-    every: int = 1,
+    scene: Scene, posture: str | None = None, share: float = 1.0, rise: float = 1.0, duration: float = 2.0, step: float = 1e-3
 ) -> Setup:  # fmt: skip
     """Move by `share` of the study's move in `rise` (s), then rest until `duration` (s)."""
     own = motion_of(scene, posture)
     move = replace(own, travel=share * own.travel, rise=rise, duration=duration)
-    return Setup(scene, move, own.angles, duration, step, rise, every)
+    return Setup(scene, move, own.angles, duration, step, rise)
 
 
 def move_in_words(scene: Scene) -> str:
@@ -104,9 +99,9 @@ def dead_stop(scene: Scene, step: float = 1e-3) -> Setup:
 
 def to_the_ends(scene: Scene, longest: bool) -> Setup:
     """Move all cylinders from near their longest or shortest allowed stroke to that stroke."""
-    ends = np.array([stroke_range(scene, i, RANGE_SAMPLES) for i in range(len(scene.joints))])
+    ends = np.array([stroke_range(scene, i, 1001) for i in range(len(scene.joints))])
     last, other = (ends[:, 1], ends[:, 0]) if longest else (ends[:, 0], ends[:, 1])
-    first = last + TRAVEL_SHARE * (other - last)
+    first = last + 0.05 * (other - last)
     move = Motion("to the ends", joint_angles_of_strokes(scene, first), first, last - first, 1.0, 2.0)
     return Setup(scene, move, move.angles, 2.0, 1e-3, 1.0)
 
@@ -140,16 +135,11 @@ STEPS = (  # step, rise, duration (s), share of the move
     (1e-6, 0.01, 0.02, 0.05), (1e-5, 0.05, 0.1, 0.05), (1e-4, 0.2, 0.4, 0.05), (1e-3, 1.0, 2.0, 1.0), (5e-3, 1.0, 2.0, 1.0),
     (2e-2, 2.0, 4.0, 1.0), (5e-2, 4.0, 8.0, 1.0),
 )  # fmt: skip
-COUNTS = (2, 3, 5, 10, 20, 50, 100, 200)
-PAYLOADS = (0.1, 1.0, 3.0, 10.0)
-MODE_COUNTS = (1, 2, 4, 6, 8, 10)
-HANGING = (0.0, -90.0, -90.0, -90.0)  # deg
-FOLDED = (80.0, -80.0, -240.0, -400.0)  # deg
-TEN_MINUTES, DAY, LARGE_STEP = 600.0, 86400.0, 2e-2  # s
+TEN_MINUTES, LARGE_STEP = 600.0, 2e-2  # s
 
 
 def cases(scene: Scene) -> tuple[Case, ...]:
-    """Return all cases of a scene but the holds of a day; those with a geometry of their own take the default boom."""
+    """Return all cases of a scene; those with a geometry of their own take the default boom."""
     found = (
         Case("scene", "as it is", "nothing", partial(smooth, scene), quick=True),
         *_stiffness(scene), *_masses(scene), *_steps(scene), *_sections(), *_geometry(scene),
@@ -165,7 +155,7 @@ def _stiffness(scene: Scene) -> Iterator[Case]:
         yield Case(group, f"k {short(k)} N/m", "all cylinders", make, quick=k in (STIFFNESSES[0], STIFFNESSES[-1]))
     yield Case(group, "incompressible", "cylinders without k", partial(smooth, made.cylinders(scene, None)), quick=True)
     group = "bending stiffness"
-    hanging = made.posed(made.bending(load_scene(), FACTORS[0]), HANGING)
+    hanging = made.posed(made.bending(load_scene(), FACTORS[0]), (0.0, -90.0, -90.0, -90.0))
     yield Case(group, "EI x 1e-3, hanging", "default boom, sections 2 to 4 hang", partial(smooth, hanging, "case", 0.4))
     for factor in FACTORS:
         make = partial(smooth, made.bending(scene, factor))
@@ -195,25 +185,25 @@ def _steps(scene: Scene) -> Iterator[Case]:
 
 
 def _sections() -> Iterator[Case]:
-    for count in COUNTS:
+    for count in (2, 3, 5, 10, 20, 50, 100, 200):
         make = partial(_long, count)
         yield Case("length", f"{count} sections", "20 m in all, cylinder 1 moves, dt 1 ms", make, quick=count in (2, 20))
     yield Case("length", "101 m", "seven sections, cylinder 1 moves, dt 5 ms", partial(_large), quick=True)
 
 
 def _long(count: int) -> Setup:
-    return first_cylinder(long_boom(count), "test", 0.03, 1e-3, 0.5, 1.0 if count <= 20 else 0.6)
+    return first_cylinder(made.long_boom(count), "test", 0.03, 1e-3, 0.5, 1.0 if count <= 20 else 0.6)
 
 
 def _large() -> Setup:
-    return first_cylinder(seven_sections(), "test", 0.05, 5e-3, duration=4.0)
+    return first_cylinder(made.seven_sections(), "test", 0.05, 5e-3, duration=4.0)
 
 
 def _geometry(scene: Scene) -> Iterator[Case]:
-    group, boom = "geometry", load_scene()
+    group, folded = "geometry", made.posed(load_scene(), (80.0, -80.0, -240.0, -400.0))
     yield Case(group, "shortest strokes", "all cylinders go there", partial(to_the_ends, scene, False))
     yield Case(group, "longest strokes", "all cylinders go there", partial(to_the_ends, scene, True))
-    yield Case(group, "fully folded", "default boom", partial(smooth, made.posed(boom, FOLDED), "case", 0.3), quick=True)
+    yield Case(group, "fully folded", "default boom", partial(smooth, folded, "case", 0.3), quick=True)
 
 
 def _dead_centres() -> Iterator[Case]:
@@ -251,21 +241,9 @@ def _holds(scene: Scene) -> Iterator[Case]:
 
 
 def _payload_and_modes(scene: Scene) -> Iterator[Case]:
-    for share in PAYLOADS:
+    for share in (0.1, 1.0, 3.0, 10.0):
         make = partial(smooth, made.loaded(scene, share))
-        yield Case("payload", f"{share:g} x boom", "of the boom's mass, at the tip", make, quick=share == PAYLOADS[-1])
-    for count in MODE_COUNTS:
+        yield Case("payload", f"{share:g} x boom", "of the boom's mass, at the tip", make, quick=share == 10.0)
+    for count in (1, 2, 4, 6, 8, 10):
         make = partial(smooth, made.with_modes(scene, count))
-        yield Case("modes", f"{count} a part", "bending coordinates", make, quick=count == MODE_COUNTS[-1])
-
-
-def long_holds(scene: Scene) -> tuple[Case, ...]:
-    """Return the holds of 24 simulated hours."""
-    booms: tuple[tuple[str, Scene, Truth], ...] = (
-        ("24 h", scene, "equilibrium"),
-        ("24 h, undamped", made.undamped(scene), "swing"),
-    )
-    return tuple(
-        Case("hold", name, "dt 20 ms, after the move", partial(smooth, boom, None, 1.0, 1.5, DAY, LARGE_STEP, 50), truth)
-        for name, boom, truth in booms
-    )
+        yield Case("modes", f"{count} a part", "bending coordinates", make, quick=count == 10)

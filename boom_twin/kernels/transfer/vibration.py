@@ -1,6 +1,17 @@
-"""Natural frequencies by counting negative pivots, and the boom's response to the inertia of a motion: loops of sweeps.
+"""Small vibrations about a state at rest by transfer matrices: the Riccati sweeps of a time step, with weights of their own.
 
-What `boom_twin.analysis.modal` says of them; a start from rest needs about two hundred counts.
+A time step sets a = A (x - x_hat) and v = C x + D with the integrator's weights A and C (`kernels.integrators`). It condenses
+the tangent K + C D + A M of every element (there D is the damping matrix). Small harmonic motion x + Re(dx e^(s t)) with
+s = i omega about a rest state x has a = s^2 dx and v = s dx. This is a time step with A = s^2, C = s, x_hat = x and D = -s x.
+The sweeps on complex numbers with these weights condense the dynamic stiffness
+
+    H(s) = K + s D + s^2 M
+
+of the boom linearised about the state, and solve H(s) dx = load. K includes the geometric stiffness of weight and pin forces.
+No sum over natural modes is used.
+
+Without damping H(s) is real, and its negative pivots tell how many natural frequencies lie below omega: see
+`boom_twin.analysis.modal`. A start from rest needs about two hundred counts.
 """
 
 from __future__ import annotations
@@ -16,10 +27,58 @@ from .forward_kinematics import place
 from .riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
 NOT_COUNTED = -1
-RENEW = np.bool_(True)
-TRIES = 20  # frequencies, each a little beside the last, where one meets a pivot that is zero
-BALANCED = 6  # times that rows of a matrix are brought to one order of magnitude
-LARGE = 0.64  # of the largest entry beside the diagonal, from which on one of the diagonal is a pivot by itself
+RENEW = np.bool_(True)  # typed, because numba compiles once more for every literal
+TIP_FORCE = np.int64(2)  # number of leading load entries for the tip force; the drives follow
+
+
+@kernel
+def harmonic_response(t, state, work, drive, rates, loads, pins, increments, tip):
+    """Write complex amplitudes of all unknowns and of the tip under harmonic loads about a state at rest.
+
+    With ideal pins the response is linear in the load; a large load reduces rounding by the static forces. With clearance the
+    tangents are recomputed under the load and depend on it. Use a load that is small against the static forces. The linear
+    response is half the difference between the responses to the load and to its opposite.
+
+    `state` is in equilibrium and placed in `work`, which `kernels.tables.complex_scratch` made. `drive` (n,) are its drive
+    lengths, m; `rates` (k,) are s = i omega, 1/s; `loads` (k, 2 + n) the force at the tip in x and y (N), then the drive of
+    every cylinder (m). `pins` (2, pins, HOLD_COLUMNS) are `Work.hold` of the journals at rest, and its derivative by s.
+    `increments` (k, unknowns) and `tip` (k, 3), x, y (m) and orientation (rad), are written.
+
+    Return status and row: OK, or SINGULAR at `rates[row]`.
+    """
+    operations = t.operations.shape[0]
+    loaded = np.bool_(pins.shape[1] > 0)
+    for k in range(rates.shape[0]):
+        rate = rates[k]
+        for i in range(work.position.shape[0]):
+            work.offset[i] = -rate * work.position[i]
+        for i in range(pins.shape[1]):
+            for j in range(pins.shape[2]):
+                work.hold[i, j] = pins[0, i, j] + rate * pins[1, i, j]
+        put_load(work, drive, rate, loads[k], 0.0)
+        motion = Motion(rate * rate, rate, work.position, work.offset, RENEW)
+        status, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
+        if status != OK:
+            return status, k
+        put_load(work, drive, rate, loads[k], 1.0)
+        motion = Motion(rate * rate, rate, work.position, work.offset, loaded)
+        sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
+        sweep_out(t, state, work, ROOT, operations, FREE)
+        for i in range(increments.shape[1]):
+            increments[k, i] = work.dz[i]
+        for i in range(tip.shape[1]):
+            tip[k, i] = work.cut[i]
+    return OK, rates.shape[0]
+
+
+@inner
+def put_load(work, drive, rate, load, share):
+    """Set tip force and drives to `share` of a load; 0 for tangents, because these include forces."""
+    clear_cut(work, FREE)
+    work.p[0], work.p[1] = -share * load[0], -share * load[1]
+    for i in range(drive.shape[0]):
+        work.drive[i] = drive[i] + share * load[TIP_FORCE + i]
+        work.drive_rate[i] = rate * share * load[TIP_FORCE + i]
 
 
 @kernel
@@ -31,7 +90,7 @@ def count_below(t, state, work, position, drive, still, omega, scratch):
     `NOT_COUNTED` if the stiffness is not finite.
     """
     status = OK
-    for _ in range(TRIES):
+    for _ in range(20):  # each a little beside the last, where one meets a pivot that is zero
         motion = Motion(-omega * omega, 0.0, position, still, RENEW)
         status, count = condense(t, state, work, motion, drive, still)
         if status == OK:
@@ -49,7 +108,7 @@ def condense(t, state, work, motion, drive, still):
     """Sweep the whole boom in; return status, and negative pivots of beams."""
     clear_cut(work, FREE)
     load_pins(t, state, work, motion)
-    status, negative, _ = sweep_in(t, state, work, motion, drive, still, ROOT, t.operations.shape[0], FREE, work.condensed)
+    status, negative, _ = sweep_in(t, state, work, motion, drive, still, ROOT, t.operations.shape[0], FREE)
     return status, negative
 
 
@@ -93,7 +152,7 @@ def negative_eigenvalues(blocks, scratch):
         for i in range(m):
             for j in range(m):
                 scratch[i, j] = blocks[k, i, j]
-        for _ in range(BALANCED):
+        for _ in range(6):
             balance(scratch, m)
         for i in range(m):
             for j in range(m):
@@ -120,7 +179,7 @@ def balance(a, m):
 def negative_pivots(a, m):
     """Negative eigenvalues of a symmetric matrix, as many as its pivots have: eliminated from the largest on; `a` is lost.
 
-    A pivot is an entry of the diagonal, or two rows where one beside it is much larger: that block has one of each sign
+    A pivot is an entry of the diagonal, or two rows where one beside it is larger by 1/0.64: that block has one of each sign
     (Bunch and Parlett, SIAM Journal on Numerical Analysis 8, 1971).
     """
     count = 0
@@ -134,7 +193,7 @@ def negative_pivots(a, m):
                     beside, row, column = abs(a[i, j]), i, j
         if largest == 0.0 and beside == 0.0:
             return count
-        if largest >= LARGE * beside:
+        if largest >= 0.64 * beside:
             m -= 1
             exchange(a, at, m, m + 1)
             if a[m, m] < 0.0:
@@ -178,7 +237,7 @@ def inertia_response(t, state, work, position, drive, still, omega, load, size, 
         for i in range(hat.shape[0]):
             hat[i] = position[i] + (sign * size) * load[i]
         condense(t, state, work, Motion(-omega * omega, 0.0, hat, still, RENEW), drive, still)
-        sweep_out(t, state, work, work.condensed, ROOT, t.operations.shape[0], FREE)
+        sweep_out(t, state, work, ROOT, t.operations.shape[0], FREE)
         for i in range(found.shape[0]):
             found[i] = work.dz[i] if sign > 0.0 else found[i] - work.dz[i]
 
