@@ -24,7 +24,7 @@ from ..system.csv_table import NOTHING, CsvTable, read_csv_pieces
 from ..system.received_files import open_received
 from ..types import SECOND, SENSORS, Sample, Stream, channels_of
 from .session_file import SessionFile, channel_of, schema_of
-from .session_files import samples_of, sensor_message
+from .session_writer import samples_of, sensor_message
 
 TIME = "t_s"
 _NUMBERED = re.compile(r"(?:stroke_(\d{1,3})_m|joint_(\d{1,3})_rad|cylinder_force_(\d{1,3})_N)")

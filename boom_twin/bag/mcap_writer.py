@@ -32,7 +32,7 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC, CompressionType
 from zstandard import ZstdCompressor
 
-from ..messages.encoded_block import Bytes, EncodedBlock
+from ..messages.cdr_encoder import Bytes, EncodedBlock
 from ..twin.blocks import Integers
 from .mcap_records import MESSAGE_HEAD, PREFIX
 

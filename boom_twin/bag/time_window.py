@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BagError
-from ..messages.message_block import MessageBlock
+from ..messages.cdr_decoder import MessageBlock
 from ..types import NANO
 
 NEVER = 2**64 - 1  # log time after all others, ns

@@ -16,7 +16,7 @@ import numpy as np
 from mcap.writer import CompressionType
 
 from ..errors import BagError
-from ..messages.encoded_block import EncodedBlock
+from ..messages.cdr_encoder import EncodedBlock
 from ..messages.topic_table import Topic
 from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED

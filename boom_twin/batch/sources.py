@@ -9,8 +9,8 @@ from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from pathlib import Path
 
-from ..bag.session_sheet import sheet_path
-from ..bag.storages import is_session
+from ..bag.reader import is_session
+from ..bag.session_model import sheet_path
 from ..errors import UsageError
 
 LIST = ".txt"  # suffix of a file that lists sessions

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bag.joint_names import refuse_other_names
+from ..bag.advice import refuse_other_names
 from ..bag.reader import Session, check_topic, files_sha256, scan
 from ..bag.time_window import WHOLE, TimeWindow
 from ..errors import BagError

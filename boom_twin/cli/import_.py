@@ -34,12 +34,10 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Read the files; write the session or print the columns."""
-    from ..bag.session_model import scene_from
-    from ..bag.session_sheet import SessionSheet
-    from ..loggers.assignment import assign
-    from ..loggers.column_file import ColumnFile, columns_of_options, load_columns
-    from ..loggers.files import tables_of
+    from ..bag.session_model import SessionSheet, scene_from
+    from ..loggers.assignment import ColumnFile, assign, columns_of_options, load_columns
     from ..loggers.import_session import import_session
+    from ..loggers.log_table import tables_of
     from ..system.result_folder import IMPORT, result_folder
 
     if args.out is None and not args.propose:

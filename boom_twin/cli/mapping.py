@@ -50,7 +50,7 @@ def _check(args: Namespace) -> int:
 
 def as_json(found: Commissioning, text: str) -> dict[str, Any]:
     """Return the result as a flat object; lists have an entry for each channel or stream."""
-    from ..wiring.words import finding, reading
+    from ..wiring.check import finding, reading
 
     verdicts = found.checked.verdicts
     return {
@@ -69,7 +69,7 @@ def as_json(found: Commissioning, text: str) -> dict[str, Any]:
 
 def as_text(found: Commissioning, text: str, out: Path | None) -> list[str]:
     """Return a table of all channels, of lags, and the proposed mapping."""
-    from ..wiring.words import STROKES_ALONE, finding, reading
+    from ..wiring.check import STROKES_ALONE, finding, reading
     from .output import columns
 
     rows = [["channel", "declared as", "found"]]

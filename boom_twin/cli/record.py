@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..bag.session_sheet import SessionSheet
+from ..bag.session_model import SessionSheet
 from ..config.settings import DEFAULT_FILE as DEFAULT_PARAMETERS
 from ..config.settings import load_settings, load_thresholds
 from ..errors import BagError, BoomTwinError
@@ -59,7 +59,7 @@ def run(args: Namespace) -> int:
     """Record until Ctrl-C, SIGTERM or the end of the duration, and print on stderr what was received."""
     require_rclpy()
     from ..bag.async_writer import FileSplit, Storage
-    from ..bag.session_sheet import incompleteness
+    from ..bag.session_model import incompleteness
     from ..bag.writer import BagWriter
     from ..ros.bag.recorder import Recorder, recorder_node
     from ..ros.bag.subscriptions import resolved, resolved_mapping

@@ -111,9 +111,8 @@ def _cylinders(text: str | None, scene: Scene) -> list[tuple[float, float]]:
 
 def run(args: Namespace) -> int:
     """Simulate, sample, write."""
-    from ..bag.session_files import write_session
-    from ..bag.session_model import scene_from
-    from ..bag.session_sheet import RIG_ORIGIN, SessionSheet
+    from ..bag.session_model import RIG_ORIGIN, SessionSheet, scene_from
+    from ..bag.session_writer import write_session
     from ..offline.ground_truth import FILE_NAME
     from ..system.result_folder import RIG, result_folder
     from ..validation.rig import (

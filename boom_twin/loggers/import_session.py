@@ -17,18 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bag.metadata import dump
-from ..bag.session_sheet import SessionSheet
+from ..bag.session_model import SessionSheet
 from ..bag.session_writer import BY_NAME, LogTimes, named_message
 from ..bag.writer import MessageWriter
 from ..config.yaml_text import plain
 from ..errors import BagError
-from ..messages.cdr_encoder import STAMP, NumberFields, Template
-from ..messages.encoded_block import EncodedBlock, EncodedRows
+from ..messages.cdr_encoder import STAMP, EncodedBlock, EncodedRows, NumberFields, Template
 from ..messages.mapping import load_mapping, mapping_from
 from ..messages.topic_table import Topics
 from ..types import NANO, SECOND, SENSORS, Array, Sample, Stream, channels_of, sensor_kind, stream_of
-from .assignment import Assignment, assign
-from .column_file import ColumnFile
+from .assignment import Assignment, ColumnFile, assign
 from .log_table import LogRows, LogTable
 from .times import Stamps, TableTimes, read_times, zone_of
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import BagError, UsageError
 from ..messages.sample_decoder import LATEST
 from ..types import SECOND, Array
-from .headers import TIME_UNITS, is_time
+from .csv_layout import TIME_UNITS, is_time
 from .log_table import LogRows, LogTable, Times
 
 Stamps = NDArray[np.int64]

@@ -16,8 +16,7 @@ from ..scene.kinematics import PassiveJoints
 from ..scene.schema import Scene
 from ..twin.blocks import STREAMS, EstimateBlock, Integers, PredictionBlock, ReportBlock, ResidualBlock
 from ..types import Alarm, Array, Change, Health, Report, channels_of
-from .cdr_encoder import NumberFields, Template, stamped
-from .encoded_block import Bytes, EncodedBlock, EncodedBlockBuilder
+from .cdr_encoder import Bytes, EncodedBlock, EncodedBlockBuilder, NumberFields, Template, stamped
 from .marker_encoder import ShapeMarkers
 from .numeric_outputs import ESTIMATED, JOINTS, PREDICTED, Chain, number_rows, put_vector, selection
 from .sample_decoder import stamp_of

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..bag.reader import Session, read, scan
-from ..bag.session_model import SessionScene, mapping_of, scene_of, settings_of, strokes_of
-from ..bag.session_sheet import kept
+from ..bag.session_model import SessionScene, kept, mapping_of, scene_of, settings_of, strokes_of
 from ..bag.time_window import WHOLE, TimeWindow
 from ..config.yaml_text import plain, read_plain
 from ..errors import BagError, UsageError
@@ -25,11 +24,8 @@ from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..twin.twin import Twin
 from ..types import NO_LAG, SENSORS, Array, Change, Place, Stream, StrokeReading
-from ..wiring.check import Checked, Verdict, check
-from ..wiring.expected import RestModel
-from ..wiring.lag import Lag, lag_of
-from ..wiring.readings import Channel, Series, Window, is_checked
-from ..wiring.words import STROKES_ALONE, finding
+from ..wiring.check import STROKES_ALONE, Checked, Verdict, check, finding
+from ..wiring.readings import Channel, Lag, RestModel, Series, Window, is_checked, lag_of
 from .session_samples import SessionSamples
 
 LOOK = 60.0  # s of a session that `wiring_of` reads

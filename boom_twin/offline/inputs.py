@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..bag.joint_names import refuse_missing_drive, refuse_other_names
+from ..bag.advice import refuse_missing_drive, refuse_other_names
 from ..bag.reader import Session, read, scan
 from ..bag.session_model import (
     SessionScene,

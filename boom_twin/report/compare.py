@@ -9,7 +9,7 @@ from math import hypot
 from pathlib import Path
 from typing import Any
 
-from ..bag.session_sheet import incompleteness
+from ..bag.session_model import incompleteness
 from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME as RESULT
 from ..errors import BagError, UsageError

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from boom_twin.bag.mcap_writer import McapWriter
-from boom_twin.messages.encoded_block import EncodedBlock, EncodedRows
+from boom_twin.messages.cdr_encoder import EncodedBlock, EncodedRows
 
 CHUNK = 2000
 Message = tuple[int, int, int, bytes]

@@ -16,7 +16,7 @@ from ruamel.yaml import YAML
 
 import boom_twin
 from boom_twin.messages.marker_encoder import ShapeMarkers
-from boom_twin.messages.view_files import RVIZ, VIEWS
+from boom_twin.messages.urdf import RVIZ, VIEWS
 
 ROOT = Path(boom_twin.__file__).parent
 LAUNCH = sorted((ROOT / "launch").glob("*.py"))

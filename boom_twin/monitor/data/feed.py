@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis.cylinder_drives import drives_as_read
-from ...bag.storages import is_session
+from ...bag.reader import is_session
 from ...compiler.compile import compile_scene
 from ...compiler.plan import Plan
 from ...errors import BagError, BoomTwinError

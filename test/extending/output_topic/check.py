@@ -8,7 +8,7 @@ import numpy as np
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_session
+from boom_twin.bag.session_writer import write_session
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import Output, load_topics
