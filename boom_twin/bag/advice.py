@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 from ..errors import BagError
 from ..messages.sample_decoder import MOST_NAMES
 from ..messages.topic_table import Qos, Topic, Topics
 from ..types import SENSORS, Stream
 from .inspect import BagInfo, Tally
-from .metadata import profiles
 from .reader import Session, TopicInfo, check_topic, read, readable
 from .session_file import CDR
 from .session_model import mapping_of
@@ -20,42 +19,15 @@ from .session_model import mapping_of
 SKEW = 0.05
 """Threshold (s) for a reported clock difference. A boom moves by centimetres in that time."""
 
-JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if kind.is_named)
-
-
-def names_missing(info: BagInfo, topics: Topics, joints: int) -> list[str]:
-    """Return a sentence for each channel (of `joints` joints) that is missing from some or all messages."""
-    found: list[str] = []
-    for stream, tally in _joint_states(info, topics):
-        own = [sensor.name for channel, sensor in topics.sensors_of(stream, joints).items() if not topics.lacks(channel)]
-        its = {names: count for names, count in tally.names.items() if not topics.is_shared or set(own) & set(names)}
-        has = {name: sum(count for names, count in its.items() if name in names) for name in own}
-        most = max(has.values(), default=0) or sum(its.values())  # messages, or cycles of separate messages
-        lacking = [(name, most - count) for name, count in has.items() if count < most]
-        found += [f"{name} is not in {count} of {most} messages of {tally.name}" for name, count in lacking]
-    return found
-
-
-def names_extra(info: BagInfo, topics: Topics, joints: int) -> list[str]:
-    """Return a sentence for each name in the messages that a replay does not use."""
-    used: dict[str, set[str]] = {}
-    for stream, tally in _joint_states(info, topics):
-        used.setdefault(tally.name, set()).update(_names(topics, stream, joints))
-    tallies = {tally.name: tally for _, tally in _joint_states(info, topics)}
-    return [
-        f"{name} of {topic} is not used"
-        for topic, tally in tallies.items()
-        for name in sorted({name for names in tally.names for name in names} - used[topic])
-    ]
-
 
 def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list[str]:
     """Return a sentence for each input of a replay that the session lacks, the worst first.
 
     `scene` is the source of the scene, named in the sentences.
     """
-    names = {stream: [name for names in tally.names for name in names] for stream, tally in _joint_states(info, topics)}
-    found = [*missing_drive(info.session, topics), *other_names(topics, names, joints, scene)]
+    found = [*missing_drive(info.session, topics)]
+    with suppress(BagError):  # the loop below tells it
+        found += other_names(topics, _names_read(info.session, topics, joints), joints, scene)
     for stream, topic in topics.inputs.items():
         if not SENSORS[stream].lack and info.session.find(topic.name) is None:
             continue
@@ -69,9 +41,7 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
             continue
         if (tally := info.tally(topic.name)) is not None:
             found += _stamps(tally)
-    lacking = names_missing(info, topics, joints)
-    remedy = "The channel stays empty there: name the driver's own names in a mapping, see topics.yaml."
-    return found + [f"{sentence}. {remedy}" for sentence in lacking]
+    return found
 
 
 def remarks(info: BagInfo, topics: Topics) -> list[str]:
@@ -125,18 +95,6 @@ def _stamps(tally: Tally) -> Iterator[str]:
         )
 
 
-def _joint_states(info: BagInfo, topics: Topics) -> Iterator[tuple[Stream, Tally]]:
-    for stream in JOINT_STATES:
-        topic = topics.inputs.get(stream)
-        if topic is not None and (tally := info.tally(topic.name)) is not None and tally.named:
-            yield stream, tally
-
-
-def _names(topics: Topics, stream: Stream, joints: int) -> list[str]:
-    """Return the names under which the channels of a stream are published."""
-    return [sensor.name for sensor in topics.sensors_of(stream, joints).values()]
-
-
 _USUAL = Qos(reliability="reliable", durability="volatile", depth=100)
 
 
@@ -150,7 +108,7 @@ class Publishable:
 
 
 def publishable(session: Session, names: Sequence[str] | None = None) -> list[Publishable]:
-    """Return the topics with these names; without names, strokes and all inputs with messages.
+    """Return the topics with these names; without names, strokes and all inputs with messages. The mapping gives the QoS.
 
     Raise BagError if a topic is missing, is empty, or is an input of another type.
     """
@@ -160,7 +118,8 @@ def publishable(session: Session, names: Sequence[str] | None = None) -> list[Pu
     else:
         found = [check_topic(session, name, _type(session, name)) for name in names]
         chosen = {topic.name: topic for topic in found}
-    return [Publishable(name, topic.type, _qos(session, topic, topics)) for name, topic in chosen.items()]
+    known = {topic.absolute: topic.qos for topic in topics.inputs.values()}
+    return [Publishable(name, topic.type, known.get(topic.name, _USUAL)) for name, topic in chosen.items()]
 
 
 def _inputs(session: Session, topics: Topics) -> dict[str, TopicInfo]:
@@ -179,27 +138,6 @@ def _type(session: Session, name: str) -> str:
     if info is not None and info.type.count("/") != 2:
         raise BagError(f"{session.path}: topic {info.name} has type {info.type!r}: no message of ROS 2. Leave it out.")
     return info.type if info else ""
-
-
-def _qos(session: Session, topic: TopicInfo, topics: Topics) -> Qos:
-    """Return the strongest QoS offered in the metadata, or else in the channels; by default the mapping's."""
-    offered = [qos for value in _values(session, topic.name) for qos in profiles(value)]
-    if not offered:
-        known = (each for each in topics.inputs.values() if each.absolute == topic.name)
-        return next((each.qos for each in known), _USUAL)
-    return Qos(
-        reliability="reliable" if any(qos.reliability == "reliable" for qos in offered) else "best_effort",
-        durability="transient_local" if any(qos.durability == "transient_local" for qos in offered) else "volatile",
-        depth=max(qos.depth for qos in offered),
-    )
-
-
-def _values(session: Session, name: str) -> list[Any]:
-    if session.metadata is not None:
-        entries = (entry.topic_metadata for entry in session.metadata.topics_with_message_count)
-        return [entry.offered_qos_profiles for entry in entries if entry.name == name]
-    channels = (channel for file in session.files for channel in file.channels.values() if channel.topic == name)
-    return [channel.metadata.get("offered_qos_profiles", "") for channel in channels]
 
 
 NAMING_TIME = 5_000_000_000  # log time (ns) from the first message of strokes or angles, in which all names are read

@@ -135,11 +135,6 @@ class BagWriter:
         return self._raw.fileno()
 
     @property
-    def completed(self) -> int:
-        """Number of complete files."""
-        return len(self._files)
-
-    @property
     def size(self) -> int:
         """Size of the open file on the disk, bytes, without data in memory."""
         return 0 if self._raw.closed else self._raw.tell()
