@@ -168,8 +168,8 @@ def replay(
         options = ReplayOptions(progress, mapping, changes, health, window, namespace, with_bag, causes)
         if is_path:
             return replay_into(building, bag, scene, settings, options)
+        from ..bag.import_session import import_session
         from ..loggers.assignment import ColumnFile
-        from ..loggers.import_session import import_session
         from ..loggers.log_table import table_of_frame
 
         kept, place = scene_from(scene), building / SESSION

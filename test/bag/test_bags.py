@@ -159,7 +159,9 @@ def test_files_that_lack_something_are_read_fully(
 ) -> None:
     path = rewritten(bag, **lacking)
     assert content(scan(path)) == content(scan(bag))
-    assert [(each.count, each.gap) for each in inspect(path).tallies] == [(each.count, each.gap) for each in inspect(bag).tallies]
+    assert [(each.count, each.gap) for each in inspect(path).tallies] == [
+        (each.count, each.gap) for each in inspect(bag).tallies
+    ]
 
 
 @pytest.mark.parametrize("options", [{}, {"use_chunking": False}], ids=["indexed", "unindexed"])
