@@ -247,27 +247,16 @@ def scene_of(session: Path, given: SceneSource | SessionScene = None) -> Session
     own = kept(session, "scene", "--scene") if given is None else None
     if own is None:
         return scene_from(given)
+    recorded, digest = kept(session, "scene_sha256", "--scene"), sha256(own.text)
     try:
-        scene, oddities = examine_text(own.text, own.source, whole=_recorded_sha256(session) == sha256(own.text))
+        scene, oddities = examine_text(own.text, own.source, whole=recorded is not None and recorded.text == digest)
     except SceneError as error:
         more = f" (and {len(error.faults) - 1} more)" if len(error.faults) > 1 else ""
         raise BagError(f"{own.source}: {error.faults[0]}{more} Give the scene by --scene.") from None
-    return SessionScene(scene, own.text, own.source, (*_changed(session, own), *oddities))
-
-
-def _changed(session: Path, own: KeptText) -> list[Fault]:
-    """Return a fault if the text differs from the recorded one."""
-    digest = _recorded_sha256(session)
-    if digest in (None, sha256(own.text)):
-        return []
-    bound = f"{own.source} has {sha256(own.text)[:12]}..: it was changed since the session was made"
-    return [Fault("scene_sha256", digest, bound, "Give the scene that is right by --scene.")]
-
-
-def _recorded_sha256(session: Path) -> str | None:
-    """Return the SHA-256 of the scene's text at the time of the session; None if it was not kept."""
-    digest = kept(session, "scene_sha256", "--scene")
-    return None if digest is None else digest.text
+    if recorded is not None and recorded.text != digest:
+        bound = f"{own.source} has {digest[:12]}..: it was changed since the session was made"
+        oddities = [Fault("scene_sha256", recorded.text, bound, "Give the scene that is right by --scene."), *oddities]
+    return SessionScene(scene, own.text, own.source, tuple(oddities))
 
 
 @dataclass(frozen=True, slots=True)

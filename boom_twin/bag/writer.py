@@ -13,7 +13,6 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from mcap.writer import CompressionType
 
 from ..errors import BagError
 from ..messages.cdr_encoder import EncodedBlock
@@ -66,11 +65,10 @@ class BagWriter:
         self,
         directory: Path,
         notes: Mapping[str, str] | None = None,
-        compression: CompressionType = CompressionType.ZSTD,
         distro: str = "jazzy",
         chunk_size: int | None = None,
     ) -> None:
-        self.directory, self._distro, self._compression = directory, distro, compression
+        self.directory, self._distro = directory, distro
         self._chunk_size = chunk_size or CHUNK_SIZE
         self._notes = dict(notes or {})
         self.topics: list[Recorded] = []
@@ -173,7 +171,7 @@ class BagWriter:
         with self._as_bag_error():
             self._raw = self.file.open("xb", buffering=0)
             self._buffered = BufferedWriter(self._raw)
-            self._writer = McapWriter(self._buffered, PROFILE, LIBRARY, self._chunk_size, self._compression)
+            self._writer = McapWriter(self._buffered, PROFILE, LIBRARY, self._chunk_size)
             if self._notes:
                 self._writer.add_metadata(NOTES, self._notes)
             self._channels, self._schemas, self._span = [], {}, None
