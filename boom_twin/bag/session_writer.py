@@ -28,60 +28,14 @@ from .writer import BagWriter, MessageWriter, recorded
 _UNKNOWN = -1.0  # first element of a covariance: the quantity is not measured (REP-145)
 
 
-def write_session(
-    directory: Path,
-    stamps_ns: NDArray[np.int64],
-    strokes: Array,
-    joints: Array | None,
-    imu: Array | None,
-    description: Mapping[str, str],
-    angle_stamps_ns: NDArray[np.int64] | None = None,
-    forces: Array | None = None,
-    placed: Mapping[Stream, Array] | None = None,
-) -> None:
-    """Write the bag of one session in the order of its stamps. Log times are the stamps.
-
-    Parameters
-    ----------
-    directory : Path
-        New or empty folder.
-    stamps_ns : ndarray of int, shape (k,)
-        Stamps, ns.
-    strokes : ndarray, shape (k, n)
-        Strokes, m.
-    joints : ndarray, shape (k, n), optional
-        Joint angles, rad.
-    imu : ndarray, shape (k, 2), optional
-        Specific force along x and z of the tip, m/s^2.
-    description : dict of str to str
-        Notes of the bag. Describe the session, and state if it is synthetic.
-    angle_stamps_ns : ndarray of int, shape (k,), optional
-        Stamps of the joint angles, if other than the strokes'.
-    forces : ndarray, shape (k, n), optional
-        Cylinder forces, N, positive in tension.
-    placed : dict of Stream to ndarray, shape (k, channels), optional
-        Readings of further sensors.
-
-    Raises
-    ------
-    UsageError
-        If the shapes do not agree.
-    BagError
-        If `directory` holds anything.
-    """
-    values = {Stream.STROKES: strokes, Stream.ANGLES: joints, Stream.IMU: imu, Stream.FORCES: forces}
-    values |= placed or {}
-    there = {stream: rows for stream, rows in values.items() if rows is not None}
-    _check_shapes(len(stamps_ns), strokes.shape[-1], there)
-    write_samples(directory, samples_of(stamps_ns, there, angle_stamps_ns), there, description)
-
-
 def write_samples(
     directory: Path, samples: Iterable[Sample], streams: Iterable[Stream], description: Mapping[str, str]
 ) -> None:
-    """Write the bag of one session from ordered `samples`, with the topics of `streams`. Else as `write_session`.
+    """Write the bag of one session into a new or empty folder from ordered `samples`, with the topics of `streams`.
 
-    Readings that come beside others, those of a gyro, are in the messages with the same stamp.
+    Log times are the stamps. Readings that come beside others, those of a gyro, are in the messages with the same stamp.
+    `description` are the notes of the bag: describe the session, and state if it is synthetic. Raise BagError if `directory`
+    holds anything.
     """
     samples, inputs = list(samples), every_input()
     beside = {
@@ -136,14 +90,6 @@ def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
     msg.name = [*kind.channels(joints)] if kind.gives else [f"{kind.named}_{end}" for end in kind.ends or range(1, 1 + joints)]
     setattr(msg, kind.field, np.array(sample.values, dtype=float))
     return msg
-
-
-def _check_shapes(rows: int, joints: int, values: Mapping[Stream, Array]) -> None:
-    for stream, kind in SENSORS.items():
-        shape = rows, len(kind.channels(joints))
-        if stream in values and values[stream].shape != shape:
-            found = f"{kind.title}: shape {values[stream].shape}, not {shape}"
-            raise UsageError(f"{found}. Give one row for each of {rows} stamps.")
 
 
 CLOCK_SET = SECOND  # step back of a stamp (ns) above which a clock was set; a smaller one is a late row
