@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from .analysis.frequency_response import frequency_response
     from .analysis.initial_state import undeflected
     from .analysis.simulate import simulate
+    from .bag.session_file import TimeWindow
     from .bag.session_writer import SessionWriter
-    from .bag.time_window import TimeWindow
     from .config.settings import Settings, load_settings
     from .errors import BagError, BoomTwinError, SceneError, SceneWarning, SolverError, UsageError
     from .monitor.live_page import LivePage
@@ -45,7 +45,7 @@ _NAMES = {
     "analysis.initial_state": "undeflected",
     "analysis.simulate": "simulate",
     "bag.session_writer": "SessionWriter",
-    "bag.time_window": "TimeWindow",
+    "bag.session_file": "TimeWindow",
     "config.settings": "Settings load_settings",
     "errors": "BagError BoomTwinError SceneError SceneWarning SolverError UsageError",
     "monitor.live_page": "LivePage",

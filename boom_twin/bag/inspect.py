@@ -12,8 +12,7 @@ from ..messages.cdr_decoder import has_header, stamp_in
 from ..messages.type_store import jazzy
 from ..types import NANO
 from .reader import Session, scan
-from .session_file import CDR, SessionFile, as_bag_error, schema_of
-from .time_window import WHOLE, TimeWindow
+from .session_file import CDR, WHOLE, SessionFile, TimeWindow, as_bag_error, schema_of
 
 
 class Skew(NamedTuple):

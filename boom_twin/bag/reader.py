@@ -23,9 +23,8 @@ from ..messages.type_store import other_than_jazzy
 from ..system.received_files import holds_file, sha256_of
 from . import csv_file, mcap_file, other_storages
 from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata, refuse_packed
-from .session_file import CDR, SessionBlocks, SessionFile, compare_counts
+from .session_file import CDR, WHOLE, SessionBlocks, SessionFile, TimeWindow, compare_counts
 from .session_model import incompleteness, kept_origin
-from .time_window import WHOLE, TimeWindow
 
 SUMMARISE: dict[str, Callable[[Path], SessionFile]] = {
     ".mcap": mcap_file.summarise,

@@ -24,7 +24,7 @@ from . import metadata as bagmeta
 from .mcap_file import NOTES, PROFILE
 from .mcap_records import MOST_HELD
 from .mcap_writer import McapWriter
-from .metadata import Recorded, file_information, metadata_of
+from .metadata import Recorded, WrittenFile, metadata_of
 
 
 def claim_directory(directory: Path) -> None:
@@ -76,7 +76,7 @@ class BagWriter:
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self.counts: Counter[int] = Counter()
         self.sync: Callable[[int], None] = os.fsync  # puts a file that is complete on the disk, by its descriptor
-        self._files: list[bagmeta.FileInformation] = []
+        self._files: list[WrittenFile] = []
         self._due = 0.0  # when metadata.yaml is written again at a split, s of `time.monotonic`
         self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
@@ -197,8 +197,7 @@ class BagWriter:
         self.sync(self.flush())
         self._completed += self.size
         self._raw.close()
-        first, last, count = self._span or (0, 0, 0)
-        self._files.append(file_information(file_name(len(self._files)), first, last, count))
+        self._files.append(WrittenFile(file_name(len(self._files)), *(self._span or (0, 0, 0))))
 
     @contextmanager
     def _as_bag_error(self) -> Iterator[None]:

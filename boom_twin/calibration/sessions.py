@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..bag.advice import refuse_other_names
 from ..bag.reader import Session, check_topic, files_sha256, scan
-from ..bag.time_window import WHOLE, TimeWindow
+from ..bag.session_file import WHOLE, TimeWindow
 from ..errors import BagError
 from ..messages.topic_table import Topics
 from ..offline.session_samples import SessionSamples

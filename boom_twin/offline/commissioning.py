@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..bag.reader import Session, read, scan
+from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import SessionScene, kept, mapping_of, scene_of, settings_of, strokes_of
-from ..bag.time_window import WHOLE, TimeWindow
 from ..config.yaml_text import plain, read_plain
 from ..errors import BagError, UsageError
 from ..messages.mapping import mapping_from

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..bag.advice import refuse_missing_drive, refuse_other_names
 from ..bag.reader import Session, read, scan
+from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import (
     SessionScene,
     SessionStrokes,
@@ -16,7 +17,6 @@ from ..bag.session_model import (
     settings_of,
     strokes_of,
 )  # fmt: skip
-from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..messages.sample_decoder import NO_MEASUREMENT

@@ -15,8 +15,8 @@ import numpy as np
 
 from .. import __version__
 from ..bag.reader import Session
+from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import SessionScene, SessionSheet, scene_from
-from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
 from ..diagnostics.boom_mismatch import OtherBoom

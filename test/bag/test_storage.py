@@ -49,7 +49,7 @@ def test_splits(tmp_path: Path, split: FileSplit, files: int | None, monkeypatch
     assert fill(Storage(BagWriter(tmp_path / "bag", {"note": "n"}), split, pytest.fail), 500) == [500]
     metadata = read_metadata(tmp_path / "bag" / "metadata.yaml")
     assert len(metadata.relative_file_paths) == (files or len(metadata.files)) > bool(split.size)
-    assert sum(file.message_count for file in metadata.files) == metadata.message_count == 500
+    assert sum(file["message_count"] for file in metadata.files) == metadata.message_count == 500
     assert numbers(tmp_path / "bag") == list(range(500))
     with AnyReader([tmp_path / "bag"]) as reader:
         assert reader.message_count == sum(1 for _ in reader.messages()) == 500

@@ -15,7 +15,7 @@ from ros_messages import load_topics, new_message
 from ruamel.yaml import YAML
 
 import boom_twin
-from boom_twin.messages.marker_encoder import ShapeMarkers
+from boom_twin.messages.report_encoder import ShapeMarkers
 from boom_twin.messages.urdf import RVIZ, VIEWS
 
 ROOT = Path(boom_twin.__file__).parent
