@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
@@ -25,9 +25,10 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
 
     `scene` is the source of the scene, named in the sentences.
     """
-    found = [*missing_drive(info.session, topics)]
+    found: list[str] = []
     with suppress(BagError):  # the loop below tells it
-        found += other_names(topics, _names_read(info.session, topics, joints), joints, scene)
+        for sentence in conflicts(info.session, topics, joints, scene):
+            found.append(sentence)
     for stream, topic in topics.inputs.items():
         if not SENSORS[stream].lack and info.session.find(topic.name) is None:
             continue
@@ -146,53 +147,39 @@ KINDS = {stream: kind.named for stream, kind in SENSORS.items() if kind.is_named
 NAMES_TOLD = 12  # limit for the number of names in a sentence
 
 
-def refuse_other_names(session: Session, topics: Topics, joints: int, scene: str = "") -> None:
-    """Raise BagError if a session names other cylinders or joints than a scene has.
-
-    `scene` is the source of the scene; empty if unknown.
-    """
-    for sentence in other_names(topics, _names_read(session, topics, joints), joints, scene):
-        raise BagError(f"{session.path}: {sentence}")
-
-
 DRIVE_REMEDY = (
     "If this boom has no stroke transducers, write `drive: angles` in a mapping (--mapping; the node: parameter mapping)."
 )
 
 
-def refuse_missing_drive(session: Session, topics: Topics) -> None:
-    """Raise BagError if strokes drive the model, and a session has angles but no strokes."""
-    for sentence in missing_drive(session, topics):
+def refuse_conflicts(session: Session, topics: Topics, joints: int, scene: str = "") -> None:
+    """Raise BagError if a session is of another boom than a scene, or lacks what drives the model; see `conflicts`."""
+    for sentence in conflicts(session, topics, joints, scene):
         raise BagError(f"{session.path}: {sentence}")
 
 
-def missing_drive(session: Session, topics: Topics) -> Iterator[str]:
-    """Yield the error sentence of `refuse_missing_drive`, if any."""
-    strokes = topics.inputs.get(Stream.STROKES)
-    found = [session.find(topic.name) for topic in (strokes, topics.inputs[Stream.ANGLES]) if topic is not None]
-    counts = [0 if topic is None else topic.count for topic in found]
-    if strokes is not None and counts[0] == 0 < counts[1]:
-        name = topics.inputs[Stream.ANGLES].absolute
-        yield f"no strokes ({strokes.absolute}), but {counts[1]} messages of {name}. {DRIVE_REMEDY}"
+def conflicts(session: Session, topics: Topics, joints: int, scene: str) -> Iterator[str]:
+    """Yield an error sentence for each conflict between a session and a scene (of source `scene`) with `joints` joints.
 
-
-def other_names(topics: Topics, names: Mapping[Stream, Collection[str]], joints: int, scene: str) -> Iterator[str]:
-    """Yield an error sentence for each conflict between `names` of a session and a scene of `joints` joints.
-
-    Cylinders and joints beyond the scene are a conflict. A sensor that drives the model and is never named is a conflict, too:
-    the prediction needs it. Other unknown or missing names are ignored.
+    Angles without the strokes that drive the model are a conflict. Cylinders and joints beyond the scene are a conflict. A
+    sensor that drives the model and is never named is a conflict, too: the prediction needs it. Other unknown or missing names
+    are ignored.
     """
+    drive, strokes, angles = topics.stroke_reading.stream, topics.inputs.get(Stream.STROKES), topics.inputs[Stream.ANGLES]
+    heard = session.find(angles.name)
+    if strokes is not None and heard is not None and heard.count and not getattr(session.find(strokes.name), "count", 0):
+        yield f"no strokes ({strokes.absolute}), but {heard.count} messages of {angles.absolute}. {DRIVE_REMEDY}"
+    names = _names_read(session, topics, joints)
     for stream, found in names.items():
         if beyond := topics.beyond(stream, joints, found):
             yield extra_names_message(topics.inputs[stream].absolute, beyond, stream, joints, scene)
-    drive = topics.stroke_reading.stream
-    found = names.get(drive, ())
-    lacking = [sensor.name for sensor in topics.sensors_of(drive, joints).values() if sensor.name not in found]
-    if found and lacking:
-        angles = {sensor.name for sensor in topics.sensors_of(Stream.ANGLES, joints).values()}
-        is_alone = topics.is_shared and len(lacking) == joints and angles.issubset(found)
+    named = names.get(drive, {})
+    lacking = [sensor.name for sensor in topics.sensors_of(drive, joints).values() if sensor.name not in named]
+    if named and lacking:
+        own = {sensor.name for sensor in topics.sensors_of(Stream.ANGLES, joints).values()}
+        is_alone = topics.is_shared and len(lacking) == joints and own.issubset(named)
         yield (
-            f"{topics.inputs[drive].absolute} never names {_listed(lacking)}, but {_listed(found)}; "
+            f"{topics.inputs[drive].absolute} never names {_listed(lacking)}, but {_listed(named)}; "
             f"{_scene(scene)} has {_counted(joints, KINDS[drive])}. Give that of this boom by --scene, or its names by "
             "--mapping." + (f" {DRIVE_REMEDY}" if is_alone else "")
         )

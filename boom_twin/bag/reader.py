@@ -76,15 +76,6 @@ def stored_files(path: Path, storage: str = "") -> list[Path]:
     return files
 
 
-def check_listed(path: Path, named: list[Path]) -> None:
-    """Raise BagError for a file that the metadata does not name: its recorder was killed."""
-    if unlisted := sorted(file.name for file in path.iterdir() if file.suffix in STORAGES and file not in named):
-        raise BagError(
-            f"{path}: {FILE_NAME} does not name {', '.join(unlisted)}: the recorder was ended by force. "
-            "`boom_twin recover BAG --out DIR` saves all of it; or move the file away."
-        )
-
-
 def sources(path: Path) -> tuple[list[Path], BagMetadata | None]:
     """Return the .mcap files of a session (first those that its metadata names, then others by number) and the metadata."""
     metadata: BagMetadata | None = None
@@ -201,8 +192,12 @@ def _scan(path: Path, incomplete: str) -> Session:
     metadata = read_metadata(path / FILE_NAME) if holds_file(path / FILE_NAME) else None
     named = [path / name for name in metadata.file_names] if metadata else stored_files(path)
     files = tuple(summarise(file) for file in named)
-    if metadata is not None:
-        check_listed(path, named)
+    there = path.iterdir() if metadata else ()
+    if unlisted := sorted(file.name for file in there if file.suffix in STORAGES and file not in named):
+        raise BagError(
+            f"{path}: {FILE_NAME} does not name {', '.join(unlisted)}: the recorder was ended by force. "
+            "`boom_twin recover BAG --out DIR` saves all of it; or move the file away."
+        )
     topics = _topics(files)
     notes = {key: value for file in files for key, value in file.notes.items()}
     if metadata is not None:

@@ -149,12 +149,6 @@ def kept_origin(session: Path) -> dict[str, str]:
     return {"origin": found.text} if found else {}
 
 
-def rig_version(session: Path) -> str:
-    """Return the version of this package whose virtual rig made a session; empty for another or unknown origin."""
-    path = sheet_path(session)
-    return str(_value(path, "boom_twin", "")) if _value(path, "origin", "") == RIG_ORIGIN else ""
-
-
 def sha256(text: str) -> str:
     """Return the SHA-256 of a text in UTF-8, as hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()
@@ -330,7 +324,8 @@ def strokes_of(session: Path | None, mapped: Mapped) -> SessionStrokes:
         except ValueError:
             bound = f"it must be {' or '.join(StrokeReading)}"
             raise BagError(f"{own.source}: {own.text[:60]!r}: {bound}. Give reads in a mapping by --mapping.") from None
-    version = rig_version(session) if session is not None else ""
+    path = None if session is None else sheet_path(session)
+    version = str(_value(path, "boom_twin", "")) if path and _value(path, "origin", "") == RIG_ORIGIN else ""
     made = re.match(r"(\d{1,9})\.(\d{1,9})", version)
     if made and (int(made[1]), int(made[2])) < LENGTHS_SINCE:
         return SessionStrokes(StrokeReading.DRIVE, f"made by the virtual rig of version {version}")

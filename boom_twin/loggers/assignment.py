@@ -5,51 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ..config.yaml_text import read_plain
 from ..errors import BagError, Fault, UsageError
 from ..types import SENSORS, Stream, channels_of, sensor_kind, stream_of
 from .csv_layout import TIME_UNITS, guess, unit_of
 from .log_table import LogTable
-from .times import TimeColumn, time_places
+from .times import Entry, Text, TimeEntry, time_places
 
 _SEE = "`boom_twin import FILES --propose` prints a file to start from."
-Text = Annotated[str, Field(min_length=1, max_length=500)]
 
 
-class _Entry(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    file: Text = "*"
-
-    def is_of(self, table: LogTable) -> bool:
-        """Return True if the table's file name matches `file`."""
-        return fnmatchcase(Path(table.source).name, self.file)
-
-
-class ChannelColumn(_Entry):
+class ChannelColumn(Entry):
     """Column of one channel: header with or without unit, in files that match the pattern `file`."""
 
     column: Text
     unit: Text | None = None
-
-
-class TimeEntry(_Entry):
-    """Column with the time, or two with date and time of day."""
-
-    column: Text | list[Text]
-    unit: str = ""
-    order: Literal["", "dmy", "mdy", "ymd"] = ""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
-        return (self.column,) if isinstance(self.column, str) else tuple(self.column)
 
 
 class ColumnFile(BaseModel):
@@ -61,10 +36,9 @@ class ColumnFile(BaseModel):
     timezone: str | None = None
     columns: dict[str, ChannelColumn | Literal["none"]] = {}
 
-    def time_of(self, table: LogTable) -> TimeColumn:
+    def time_of(self, table: LogTable) -> TimeEntry | None:
         """Return the given time column of a table."""
-        entry = next((entry for entry in self.time if entry.is_of(table)), None)
-        return TimeColumn() if entry is None else TimeColumn(entry.names, unit_of(entry.unit), entry.order)
+        return next((entry for entry in self.time if entry.is_of(table)), None)
 
 
 def load_columns(path: Path) -> ColumnFile:
@@ -209,7 +183,7 @@ def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) ->
     taken = _given(found, given)
     for number, table in enumerate(tables):
         uses = [
-            _recognised(table, number, place, joints)
+            ColumnUse(number, place, *guess(table.names[place], table.units[place], joints))
             for place in range(len(table.headers))
             if table.headers[place] and place not in found.times[number] and (number, place) not in taken
         ]
@@ -267,11 +241,6 @@ def _given(found: Assignment, given: ColumnFile) -> set[tuple[int, int]]:
             _use(found, ColumnUse(number, place, channel, unit))
             taken.add((number, place))
     return taken
-
-
-def _recognised(table: LogTable, number: int, place: int, joints: int | None) -> ColumnUse:
-    by_name = guess(table.names[place], table.units[place], joints)
-    return ColumnUse(number, place, by_name.channel, by_name.unit, by_name.reason)
 
 
 def _use(found: Assignment, use: ColumnUse) -> None:

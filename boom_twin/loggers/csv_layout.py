@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from typing import NamedTuple
 
 from ..errors import BagError
 from ..system.csv_table import NOTHING, CsvLayout, marked_encoding
@@ -77,8 +78,7 @@ _TIME = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Guess:
+class Guess(NamedTuple):
     """Channel and unit of a column by its header, or the reason why none is recognised."""
 
     channel: str = ""

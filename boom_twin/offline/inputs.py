@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..bag.advice import refuse_missing_drive, refuse_other_names
+from ..bag.advice import refuse_conflicts
 from ..bag.reader import Session, read, scan
 from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import (
@@ -124,8 +124,7 @@ def replay_inputs(
         name for name, topic in topics_there.items() if drive in topics.heard[name] or (topic is not None and topic.count)
     ]
     strokes = strokes_of(session.path, mapped)
-    refuse_missing_drive(session, topics)
-    refuse_other_names(session, topics, len(joints), kept.source)
+    refuse_conflicts(session, topics, len(joints), kept.source)
     streams = tuple(
         stream
         for stream in streams_of(topics.places)
