@@ -12,7 +12,7 @@ from ..messages.sample_decoder import MOST_NAMES
 from ..messages.topic_table import Qos, Topic, Topics
 from ..types import SENSORS, Stream
 from .inspect import BagInfo, Tally
-from .reader import Session, TopicInfo, check_topic, read, readable
+from .reader import Session, check_topic, read, readable
 from .session_file import CDR
 from .session_model import mapping_of
 
@@ -27,8 +27,7 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
     """
     found: list[str] = []
     with suppress(BagError):  # the loop below tells it
-        for sentence in conflicts(info.session, topics, joints, scene):
-            found.append(sentence)
+        found.extend(conflicts(info.session, topics, joints, scene))
     for stream, topic in topics.inputs.items():
         if not SENSORS[stream].lack and info.session.find(topic.name) is None:
             continue
@@ -114,31 +113,17 @@ def publishable(session: Session, names: Sequence[str] | None = None) -> list[Pu
     Raise BagError if a topic is missing, is empty, or is an input of another type.
     """
     topics = mapping_of(session.path).topics
-    if names is None:
-        chosen = _inputs(session, topics)
+    if names is None:  # a name of the mapping may be relative to a namespace
+        chosen = {
+            topic.name: check_topic(session, topic.name, topic.type)
+            for stream, topic in topics.inputs.items()
+            if stream is topics.stroke_reading.stream or ((there := session.find(topic.name)) is not None and there.count)
+        }
     else:
-        found = [check_topic(session, name, _type(session, name)) for name in names]
+        found = [check_topic(session, name, getattr(session.find(name), "type", "")) for name in names]
         chosen = {topic.name: topic for topic in found}
     known = {topic.absolute: topic.qos for topic in topics.inputs.values()}
     return [Publishable(name, topic.type, known.get(topic.name, _USUAL)) for name, topic in chosen.items()]
-
-
-def _inputs(session: Session, topics: Topics) -> dict[str, TopicInfo]:
-    """Return the input topics by their names in the mapping, which may be relative to a namespace."""
-    found: dict[str, TopicInfo] = {}
-    for stream, topic in topics.inputs.items():
-        info = session.find(topic.name)
-        if stream is topics.stroke_reading.stream or (info is not None and info.count):
-            found[topic.name] = check_topic(session, topic.name, topic.type)
-    return found
-
-
-def _type(session: Session, name: str) -> str:
-    """Return the type of a topic; empty if it is missing (`check_topic` raises the error)."""
-    info = session.find(name)
-    if info is not None and info.type.count("/") != 2:
-        raise BagError(f"{session.path}: topic {info.name} has type {info.type!r}: no message of ROS 2. Leave it out.")
-    return info.type if info else ""
 
 
 NAMING_TIME = 5_000_000_000  # log time (ns) from the first message of strokes or angles, in which all names are read
