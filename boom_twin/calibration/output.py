@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..bag.session_sheet import kept
+from ..bag.session_model import kept
 from ..config.yaml_text import with_values
 from ..errors import UsageError
 from ..messages.mapping import load_mapping

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import Mapped, mapping_of, strokes_of
-from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..scene.edit import with_parameters

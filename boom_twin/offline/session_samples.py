@@ -9,11 +9,8 @@ from itertools import repeat
 import numpy as np
 
 from ..bag.reader import Session, read, read_blocks
-from ..bag.session_blocks import SessionBlocks
-from ..bag.session_file import PARSE_ERRORS
-from ..bag.time_window import WHOLE, TimeWindow
-from ..messages.cdr_decoder import CdrDecoder, stamp_in
-from ..messages.message_block import MessageBlock
+from ..bag.session_file import PARSE_ERRORS, WHOLE, SessionBlocks, TimeWindow
+from ..messages.cdr_decoder import CdrDecoder, MessageBlock, stamp_in
 from ..messages.report_encoder import decode_changes
 from ..messages.sample_decoder import SampleDecoder
 from ..messages.topic_table import TYPES, Output, Topics

@@ -9,8 +9,8 @@ from math import hypot
 from pathlib import Path
 from typing import Any
 
-from ..bag.session_sheet import incompleteness
-from ..bag.time_window import WHOLE, TimeWindow
+from ..bag.session_file import WHOLE, TimeWindow
+from ..bag.session_model import incompleteness
 from ..bag.writer import FILE_NAME as RESULT
 from ..errors import BagError, UsageError
 from ..offline.summary import alarm_as_text

@@ -32,7 +32,7 @@ from bench.record import keep
 from default_boom import with_parameters
 
 from boom_twin import Twin, load_scene
-from boom_twin.bag.session_files import samples_of
+from boom_twin.bag.session_writer import samples_of
 from boom_twin.health.alarms import Alarms
 from boom_twin.twin.blocks import ReportBlock, block_of
 from boom_twin.types import NANO, Stream

@@ -16,8 +16,8 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk
 from mcap.writer import MCAP0_MAGIC
 
-from ...system.received_files import open_received
-from ..mcap_records import (
+from ..system.received_files import open_received
+from .mcap_records import (
     BLOCK,
     KINDS,
     MESSAGE_HEAD,
@@ -29,7 +29,7 @@ from ..mcap_records import (
     unpack_start,
     whole_parts,
 )
-from ..session_file import PARSE_ERRORS
+from .session_file import PARSE_ERRORS
 
 _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
 """Pattern of a possible start of a message, a chunk or the end of the data: opcode, and a length below 2^40."""
@@ -55,13 +55,11 @@ class DamagedBytes:
     reason: str
 
 
-def scan_damaged(
-    path: Path, unverified: bool = False, channels: Container[int] | None = None
-) -> Iterator[SoundRecords | DamagedBytes]:
+def scan_damaged(path: Path, channels: Container[int] = ()) -> Iterator[SoundRecords | DamagedBytes]:
     """Yield all bytes of a file in order as sound records and damaged bytes, with one chunk in memory at a time.
 
-    With `unverified`, the whole records at the start of a chunk whose checksum does not fit or cannot be verified are sound,
-    too. After damage, messages outside chunks are searched for in the known `channels` only.
+    The whole records at the start of a chunk that is cut off, or that has no checksum, are sound. After damage, messages
+    outside chunks are searched for in the known `channels` only.
     """
     size = path.stat().st_size
     with open_received(path) as file:
@@ -71,12 +69,12 @@ def scan_damaged(
         while offset < size - len(MCAP0_MAGIC) or (offset < size and not _ends(file, offset)):
             if (length := _chunk_length(file, offset)) is not None:
                 after = min(offset + length, size)
-                yield from _chunk_pieces(file, offset, length, size, unverified)
+                yield from _chunk_pieces(file, offset, length, size)
             elif record := _whole_record(file, offset, size):
                 after = offset + len(record)
                 yield SoundRecords(offset, False, record)
             else:
-                after = _behind(file, offset + 1, size, channels or ())
+                after = _behind(file, offset + 1, size, channels)
                 yield DamagedBytes(offset, after - offset, "no record that is whole begins here")
             offset = after
 
@@ -94,9 +92,7 @@ def _chunk_length(file: BinaryIO, offset: int) -> int | None:
     return PREFIX.size + length if PREFIX.size + length == head + packed else None
 
 
-def _chunk_pieces(
-    file: BinaryIO, offset: int, length: int, size: int, unverified: bool
-) -> Iterator[SoundRecords | DamagedBytes]:
+def _chunk_pieces(file: BinaryIO, offset: int, length: int, size: int) -> Iterator[SoundRecords | DamagedBytes]:
     """Yield the content of a chunk, or the whole records at its start, if they are wanted, and the damaged bytes."""
     chunk, start = None, b""
     file.seek(offset + PREFIX.size)
@@ -115,7 +111,7 @@ def _chunk_pieces(
         return
     except PARSE_ERRORS as error:
         reason = str(error)
-    if chunk is not None and (chunk.uncompressed_crc == 0 or unverified):
+    if chunk is not None and (chunk.uncompressed_crc == 0 or offset + length > size):
         try:
             start = whole_parts(unpack_start(chunk))
         except PARSE_ERRORS as error:

@@ -7,7 +7,7 @@ keeps it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import tzinfo
 from pathlib import Path
@@ -16,21 +16,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bag.metadata import dump
-from ..bag.session_sheet import SessionSheet
-from ..bag.session_writer import BY_NAME, LogTimes, named_message
-from ..bag.writer import MessageWriter
 from ..config.yaml_text import plain
 from ..errors import BagError
-from ..messages.cdr_encoder import STAMP, NumberFields, Template
-from ..messages.encoded_block import EncodedBlock, EncodedRows
+from ..loggers.assignment import Assignment, ColumnFile, assign
+from ..loggers.log_table import LogRows, LogTable
+from ..loggers.times import Stamps, TableTimes, read_times, zone_of
+from ..messages.cdr_encoder import STAMP, EncodedBlock, EncodedRows, NumberFields, Template
 from ..messages.mapping import load_mapping, mapping_from
 from ..messages.topic_table import Topics
 from ..types import NANO, SECOND, SENSORS, Array, Sample, Stream, channels_of, sensor_kind, stream_of
-from .assignment import Assignment, assign
-from .column_file import ColumnFile
-from .log_table import LogRows, LogTable
-from .times import Stamps, TableTimes, read_times, zone_of
+from .metadata import dump
+from .session_model import SessionSheet
+from .session_writer import BY_NAME, LogTimes, named_message
+from .writer import MessageWriter
 
 TOGETHER = 4096  # messages encoded at once
 WHOLE_SHARE = 0.5  # share of complete rows of a stream below which each message has only the channels of its row
@@ -65,7 +63,7 @@ class ImportedSession:
     counts: dict[str, int]  # messages by topic
 
 
-class _Readings(NamedTuple):
+class Readings(NamedTuple):
     """Readings of one stream in one table: log times and stamps (ns), values (rows, channels).
 
     `own` is True for channels of the table. `is_apart` is True if most rows lack a channel (signals of a bus).
@@ -112,14 +110,9 @@ def import_session(
     assignment.check(joints, drive)
     text, topics = _mapping(mapping, topics, assignment, joints)
     zone = zone_of(given.timezone) if given.timezone else None
-    read = _read(assignment, given, zone)
+    read = read_tables(assignment, given, zone)
     _check_spans(assignment, read, drive)
-    shift = max(0, SECOND - min(each.span[0] for each in read.values()))
-    readings = [
-        found
-        for number, own in read.items()
-        for found in _readings(assignment, number, own.rows, own.times.stamps + shift, topics, joints)
-    ]
+    readings = readings_of(assignment, read, topics, joints)
     origin = f"imported from {', '.join(dict.fromkeys(Path(table.source).name for table in tables))}"
     counts = _write(out, readings, topics, joints, origin)
     replace(sheet, mapping=text or None, origin=origin).write(out)
@@ -144,7 +137,8 @@ def _mapping(path: Path | None, topics: Topics, assignment: Assignment, joints: 
     return dump(document), mapping_from(document, str(path or "mapping of channels without a column"), joints)
 
 
-def _read(assignment: Assignment, given: ColumnFile, zone: tzinfo | None) -> dict[int, ReadTable]:
+def read_tables(assignment: Assignment, given: ColumnFile, zone: tzinfo | None) -> dict[int, ReadTable]:
+    """Return rows and times of all tables that have columns of channels, by their numbers."""
     found: dict[int, ReadTable] = {}
     for number in sorted({use.table for use in assignment.used}):
         table, places = assignment.tables[number], assignment.times[number]
@@ -180,12 +174,22 @@ def _check_spans(assignment: Assignment, read: dict[int, ReadTable], drive: Stre
             )
 
 
+def readings_of(assignment: Assignment, read: dict[int, ReadTable], topics: Topics, joints: int) -> list[Readings]:
+    """Return the readings of all tables in the units of the mapping; times without a date begin at 1 s."""
+    shift = max(0, SECOND - min(each.span[0] for each in read.values()))
+    return [
+        found
+        for number, own in read.items()
+        for found in _readings(assignment, number, own.rows, own.times.stamps + shift, topics, joints)
+    ]
+
+
 def _readings(
     assignment: Assignment, number: int, rows: LogRows, stamps: Stamps, topics: Topics, joints: int
-) -> list[_Readings]:
+) -> list[Readings]:
     """Return the readings of one table in the units of the mapping."""
     uses = {use.channel: use for use in assignment.used if use.table == number}
-    found, clock = list[_Readings](), LogTimes()
+    found, clock = list[Readings](), LogTimes()
     logs = np.array([clock.at(stamp) for stamp in stamps.tolist()])
     for stream in Stream:
         sensors = topics.sensors_of(stream, joints)
@@ -201,32 +205,39 @@ def _readings(
         there = np.isfinite(values[:, own])
         filled = there.any(axis=1)
         is_apart = bool(there.all(axis=1).sum() < WHOLE_SHARE * filled.sum())
-        found.append(_Readings(stream, logs[filled], stamps[filled], values[filled], own, is_apart))
+        found.append(Readings(stream, logs[filled], stamps[filled], values[filled], own, is_apart))
     return found
 
 
-def _write(out: Path, readings: list[_Readings], topics: Topics, joints: int, origin: str) -> dict[str, int]:
-    """Write all messages by log time, strokes first, and return their counts by topic."""
+def _write(out: Path, readings: list[Readings], topics: Topics, joints: int, origin: str) -> dict[str, int]:
+    """Write all messages and return their counts by topic."""
+    counts: Counter[str] = Counter()
+    inputs = {topics.inputs[each.stream].absolute: topics.inputs[each.stream] for each in readings}
+    with MessageWriter(out, inputs, {"origin": origin}) as bag:
+        for block in encoded_blocks(readings, topics, joints):
+            bag.write_block(block)
+            for rows in block.rows:
+                counts[rows.key] += len(rows.places)
+    return dict(counts)
+
+
+def encoded_blocks(readings: list[Readings], topics: Topics, joints: int) -> Iterator[EncodedBlock]:
+    """Yield all messages by log time, strokes first, up to `TOGETHER` at once, with their topics as keys."""
     kinds = [kind for each in readings for kind in _kinds(each, topics, joints)]
     logs, stamps = (np.concatenate([getattr(kind, name) for kind in kinds]) for name in ("logs", "stamps"))
     numbers = np.repeat(np.arange(len(kinds)), [len(kind.logs) for kind in kinds])
     rows = np.concatenate([np.arange(len(kind.logs)) for kind in kinds])
     ranks = np.array([kind.rank for kind in kinds])[numbers]
     order = np.lexsort((np.concatenate([kind.places for kind in kinds]), ranks, logs))
-    counts: Counter[str] = Counter()
-    inputs = {topics.inputs[each.stream].absolute: topics.inputs[each.stream] for each in readings}
-    with MessageWriter(out, inputs, {"origin": origin}) as bag:
-        for first in range(0, len(order), TOGETHER):
-            part = order[first : first + TOGETHER]
-            encoded = []
-            for number in np.unique(numbers[part]).tolist():
-                places, kind = np.flatnonzero(numbers[part] == number), kinds[number]
-                own = part[places]
-                (data,) = kind.template.fill(stamps[own], kind.values[rows[own]])
-                encoded.append(EncodedRows(kind.topic, places, data))
-                counts[kind.topic] += len(places)
-            bag.write_block(EncodedBlock(logs[part], encoded))
-    return dict(counts)
+    for first in range(0, len(order), TOGETHER):
+        part = order[first : first + TOGETHER]
+        encoded = []
+        for number in np.unique(numbers[part]).tolist():
+            places, kind = np.flatnonzero(numbers[part] == number), kinds[number]
+            own = part[places]
+            (data,) = kind.template.fill(stamps[own], kind.values[rows[own]])
+            encoded.append(EncodedRows(kind.topic, places, data))
+        yield EncodedBlock(logs[part], encoded)
 
 
 class _Kind(NamedTuple):
@@ -241,7 +252,7 @@ class _Kind(NamedTuple):
     template: Template
 
 
-def _kinds(readings: _Readings, topics: Topics, joints: int) -> list[_Kind]:
+def _kinds(readings: Readings, topics: Topics, joints: int) -> list[_Kind]:
     """Return the readings of a stream grouped by their sensor names."""
     stream, sensors = readings.stream, topics.sensors_of(readings.stream, joints)
     named = np.array([channel not in topics.absent for channel in sensors]) & readings.own

@@ -11,20 +11,19 @@ from typing import Any
 from mcap.opcode import Opcode
 from mcap.records import Channel, DataEnd, Header, Metadata, Schema, Statistics
 
-from ...config.yaml_text import LARGEST_FILE
-from ...errors import BagError
-from ...system.atomic_files import write_atomic
-from ...system.received_files import holds_file, open_received
-from ...system.result_folder import RECOVER, result_folder
-from ..mcap_file import NOTES, PROFILE
-from ..mcap_records import LARGEST_SUMMARY, MESSAGE_HEAD, checksum_of, parts, record_of, summary_start
-from ..metadata import BagMetadata, Recorded, offered_qos, profiles
-from ..reader import RECOVERED, scan, sources
-from ..session_file import as_bag_error, by_topic
-from ..session_sheet import sheet_path
-from ..storages import SUMMARISE
-from ..writer import BagWriter
+from ..config.yaml_text import LARGEST_FILE
+from ..errors import BagError
+from ..system.atomic_files import write_atomic
+from ..system.received_files import holds_file, open_received
+from ..system.result_folder import RECOVER, result_folder
+from .mcap_file import NOTES, PROFILE
+from .mcap_records import LARGEST_SUMMARY, MESSAGE_HEAD, checksum_of, parts, record_of, summary_start
+from .metadata import BagMetadata, Recorded, kept_qos
+from .reader import RECOVERED, SUMMARISE, scan, sources
 from .scanner import DamagedBytes, SoundRecords, scan_damaged
+from .session_file import as_bag_error, by_topic
+from .session_model import sheet_path
+from .writer import BagWriter
 
 
 @dataclass(slots=True)
@@ -52,25 +51,24 @@ class FileDefinitions:
             type=schema.name,
             definition=schema.data,
             details=found.metadata,
-            qos=[profile for qos in profiles(offered) for profile in offered_qos(qos)],
+            qos=kept_qos(offered),
             type_hash=known.type_description_hash if known else found.metadata.get("topic_type_hash", ""),
             encoding=found.message_encoding,
             definition_encoding=schema.encoding,
         )
 
 
-def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
+def definitions_of(path: Path) -> FileDefinitions:
     """Return the definitions, notes and counts of a file from one walk through it.
 
-    A definition is used if the checksum of its chunk or of the summary fits or is missing. With `unverified`, definitions at
-    the start of a truncated or corrupt chunk are used too. Raise BagError if the profile is ros1 or px4, or definitions exceed
-    `LARGEST_SUMMARY`.
+    A definition is used if the checksum of its chunk or of the summary fits or is missing. Raise BagError if the profile is
+    ros1 or px4, or definitions exceed `LARGEST_SUMMARY`.
     """
     found, sure = FileDefinitions(), set[tuple[int, int]]()
     statistics: Statistics | None = None
     summary = summary_start(path)
     budget, is_data = LARGEST_SUMMARY, True
-    for piece in scan_damaged(path, unverified):
+    for piece in scan_damaged(path):
         if not isinstance(piece, SoundRecords):
             continue
         is_in_summary = summary is not None and piece.offset >= summary
@@ -128,17 +126,16 @@ class Recovery:
             self.faults.append((path, fault))
 
 
-def recover(path: Path, out: Path, unverified: bool = False) -> Recovery:
+def recover(path: Path, out: Path) -> Recovery:
     """Write all recoverable messages of the session at `path` into the new directory `out`, or nothing. `path` is only read.
 
-    With `unverified`, the whole messages at the start of chunks that are cut off or whose checksum does not fit are saved,
-    too. Raise BagError if there is no session, nothing of it can be saved, or `out` cannot be written or lies in the source.
+    Raise BagError if there is no session, nothing of it can be saved, or `out` cannot be written or lies in the source.
     """
     with result_folder(out, RECOVER, [path]) as building:
-        return _recover(path, building, unverified)
+        return _recover(path, building)
 
 
-def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
+def _recover(path: Path, out: Path) -> Recovery:
     files, metadata = sources(path)
     for file in files:
         if file.suffix.lower() in SUMMARISE.keys() - {".mcap"}:
@@ -147,7 +144,7 @@ def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
     all_definitions = []
     for file in files:
         with as_bag_error(file):
-            all_definitions.append(definitions_of(file, unverified))
+            all_definitions.append(definitions_of(file))
     outcome = Recovery()
     notes = {key: value for definitions in all_definitions for key, value in definitions.notes.items()}
     notes |= metadata.notes if metadata else {}
@@ -158,7 +155,7 @@ def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
             if number and bag.first is not None:
                 bag.split()
             with as_bag_error(file):
-                _copy(file, definitions, bag, keys, outcome, metadata, unverified)
+                _copy(file, definitions, bag, keys, outcome, metadata)
         bag.close()
     except BaseException:
         bag.abandon()
@@ -178,11 +175,10 @@ def _copy(
     keys: dict[tuple[str, str, bytes], int],
     outcome: Recovery,
     metadata: BagMetadata | None,
-    unverified: bool,
 ) -> None:
     """Copy the messages of one file."""
     own: dict[int, int] = {}
-    for piece in scan_damaged(file, unverified, definitions.channels):
+    for piece in scan_damaged(file, definitions.channels):
         if isinstance(piece, DamagedBytes):
             outcome.note(file, piece)
             continue
