@@ -18,7 +18,7 @@ from ..messages.mapping import load_mapping
 from ..messages.topic_table import Topics, factor
 from ..messages.type_store import jazzy
 from ..scene.load import SceneSource
-from ..twin.readings import samples_of
+from ..twin.sample_check import samples_of
 from ..types import SECOND, SENSORS, Sample, Stream
 from .async_writer import FileSplit, Storage
 from .session_files import sensor_message
@@ -125,7 +125,7 @@ class SessionWriter:
         BagError
             The disk is full or fails, or does not keep up.
         UsageError
-            Readings by name cannot be used, see `boom_twin.twin.readings.samples_of`.
+            Readings by name cannot be used, see `boom_twin.twin.sample_check.samples_of`.
         """
         samples = samples_of(sample, stamp_ns, self._joints) if isinstance(sample, Mapping) else [sample]
         for each in samples:

@@ -13,7 +13,7 @@ from ..bag.session_sheet import incompleteness
 from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME as RESULT
 from ..errors import BagError, UsageError
-from ..offline.summary import alarm_as_text
+from ..offline.recording import alarm_as_text
 from ..system.received_files import holds_file, open_received, sha256_of
 from .quantities import Quantity, read
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..deviation.predictor import BoomPredictor, Drawn
 from ..health.blocks import MeasuredRows, PredictionRows
@@ -18,7 +17,18 @@ from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..predictions import Outline
 from ..types import Health, Report, Residuals, Stream
-from .blocks import CODES, STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
+from .blocks import (
+    CODES,
+    STREAMS,
+    EstimateBlock,
+    Integers,
+    Note,
+    PredictionBlock,
+    ReportBlock,
+    ResidualBlock,
+    SampleBlock,
+    estimate_of,
+)
 from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, ROOM, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .update import DONE, LOOK, update
@@ -121,7 +131,7 @@ class BlockUpdate:
     def advance(self, run: Run | None, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
         """Take regular samples of a block of at most `capacity`; return why that ended, see `DONE`, and how many were taken.
 
-        `run` is the present one. `trusted`: the only sample was looked at before. `reports` or `report` return the results.
+        `run` is the present one. `trusted`: the only sample was looked at before. `rows` or `report` return the results.
         """
         self.judge()
         self.make_room()
@@ -228,18 +238,14 @@ class BlockUpdate:
                 values = (each[rows, :width] for each in (found.raw, found.values, found.sigmas))
                 self._judge.measured(STREAMS[code], MeasuredRows(found.residual_stamps[rows], *values))
 
-    def _residuals(self) -> ResidualBlock:
-        found, own = self._found, slice(self._begin[1], int(self._found.counts[1]))
-        fields = found.residual_at, found.residual_streams, found.residual_stamps, found.values, found.sigmas
-        return ResidualBlock._make(each[own].copy() for each in fields)
-
-    def _predictions(self, own: slice) -> PredictionBlock:
+    def _block(self, stamps: Integers, predicted: slice, compared: slice, outlines: dict[int, Outline]) -> ReportBlock:
+        """Return the reports of samples with these stamps (ns) from rows of the results."""
         found, at = self._found, self._boom.places
-        rows = found.rows[own].copy()
+        rows, row_stamps = found.rows[predicted].copy(), found.stamps[predicted].copy()
         tip = rows[:, at.tip].reshape(-1, 3, 3)
-        return PredictionBlock(
-            at=found.at[own].copy(),
-            stamps=found.stamps[own].copy(),
+        predictions = PredictionBlock(
+            at=found.at[predicted].copy(),
+            stamps=row_stamps,
             tip_position=tip[:, 0, :2],
             tip_displacement=tip[:, 0, :2] - rows[:, at.rigid_tip],
             tip_velocity=tip[:, 1, :2],
@@ -251,38 +257,50 @@ class BlockUpdate:
             strokes=rows[:, at.strokes],
             cylinder_forces=rows[:, at.cylinder_forces],
             clearances=rows[:, at.pins].reshape(len(rows), self._pins, PIN),
-            moments=found.moments[own].copy(),
-            outlines=self._outlines(),
+            moments=found.moments[predicted].copy(),
+            outlines=outlines,
+        )
+        columns = found.residual_at, found.residual_streams, found.residual_stamps, found.values, found.sigmas
+        residuals = ResidualBlock._make(each[compared].copy() for each in columns)
+        return ReportBlock(
+            stamps, predictions, EstimateBlock(row_stamps, found.estimates[predicted].copy()), residuals, self._news.health, {}
         )
 
     def _outlines(self) -> dict[int, Outline]:
         drawn = self._news.drawn
         return dict(zip(drawn, self._boom.outlines(list(drawn.values())), strict=True)) if drawn else {}
 
-    def reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
-        """Return reports of the samples with these stamps (ns) from the results of the compiled update."""
-        self._take_judgement(len(stamps) - 1)
-        own = slice(self._begin[0], int(self._found.counts[0]))
-        estimates = EstimateBlock(self._found.stamps[own].copy(), self._found.estimates[own].copy())
-        block = ReportBlock(stamps, self._predictions(own), estimates, self._residuals(), self._news.health)
-        if not self._news.events:
-            return [block]
-        reports = enumerate(block.reports(self._joints))
-        return [replace(each, events=self._news.events.get(row, ())) for row, each in reports]
+    def rows(self, stamps: Integers, events: Sequence[str] = (), judged: bool = True) -> ReportBlock:
+        """Return the reports of the samples taken since `make_room`, with these stamps (ns); `events` are of the first.
 
-    def report(self, stamp: int, events: Sequence[str], judged: bool = True) -> Report:
-        """Return the report of one sample, with `events` added; unless `judged`, health is left out, see `judge`."""
+        Unless `judged`, the health that is due with the last sample is left out, see `judge`.
+        """
+        if judged:
+            self._take_judgement(len(stamps) - 1)
+        (predicted, compared), news = self._found.counts.tolist(), self._news
+        block = self._block(stamps, slice(self._begin[0], predicted), slice(self._begin[1], compared), self._outlines())
+        told = {0: tuple(events)} if events else {}
+        notes = {row: Note(events=told.get(row, ()) + news.events.get(row, ())) for row in sorted(told | news.events)}
+        return block._replace(notes=notes)
+
+    def no_rows(self, stamp: int, note: Note) -> ReportBlock:
+        """Return the report of a sample that gave no numbers."""
+        none = slice(0, 0)
+        return self._block(np.array([stamp]), none, none, {})._replace(health={}, notes={0: note})
+
+    def report(self, stamp: int, judged: bool = True) -> Report:
+        """Return the report of a regular sample, as `rows` does."""
         found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
         residuals = tuple(self._residuals_in(row) for row in range(self._begin[1], known))
         if predicted == self._begin[0]:
-            return Report(stamp, True, residuals=residuals, events=tuple(events))
-        at, outline = predicted - 1, None
+            return Report(stamp, True, residuals=residuals)
+        at, outline, events = predicted - 1, None, news.events.get(0, ())
         if news is not NO_EXTRAS:
-            outline, events = self._outlines().get(0), (*events, *news.events.get(0, ()))
+            outline = self._outlines().get(0)
         prediction = self._boom.prediction_in(found.rows[at].copy(), stamp, outline, found.moments[at].copy())
         health = self.judge() if judged else None
         estimate = estimate_of(stamp, found.estimates[at].copy())
-        return Report(stamp, True, prediction, residuals, tuple(events), health=health, estimate=estimate)
+        return Report(stamp, True, prediction, residuals, events, health=health, estimate=estimate)
 
     def _residuals_in(self, row: int) -> Residuals:
         found, stream = self._found, STREAMS[int(self._found.residual_streams[row])]

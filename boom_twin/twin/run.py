@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types import NANO, Array
-from .regular import reach_of_strokes
-from .state import CHECKED, EPOCH, IN_SLOT, NEWEST, OTHERS, TRUSTED, Limits, TwinState
+from .state import CHECKED, EPOCH, IN_SLOT, NEWEST, OTHERS, TRUSTED, Limits, TwinState, reach_of_strokes
 from .update import matched
 
 MOST_DOUBTED = 5  # largest number of implausible readings in a row, without a jump, that are left out

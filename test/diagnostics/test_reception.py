@@ -9,8 +9,7 @@ import pytest
 
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
-from boom_twin.diagnostics.recorder_status import DiskState, TopicCount, recording_status
-from boom_twin.diagnostics.topic_status import Reception, ReceptionWatch
+from boom_twin.diagnostics.topic_status import DiskState, Reception, ReceptionWatch, TopicCount, recording_status
 
 
 def begun(judge: ComponentJudge, now: float = 0.0) -> ComponentJudge:

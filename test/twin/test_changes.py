@@ -12,8 +12,8 @@ from default_boom import joint_angles_of_strokes, loaded, strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Stream, Twin, UsageError, load_scene
-from boom_twin.twin import loaded_model
-from boom_twin.twin.loaded_model import ModelPreparation
+from boom_twin.twin import adjustments
+from boom_twin.twin.adjustments import ModelPreparation
 
 RATE = 5_000_000  # ns
 
@@ -152,13 +152,13 @@ STEP = 5_000_000  # ns
 def makers(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The threads in which models are made."""
     found: list[str] = []
-    original = loaded_model.BoomPredictor
+    original = adjustments.BoomPredictor
 
     def noted(*arguments: Any) -> Any:
         found.append(current_thread().name)
         return original(*arguments)
 
-    monkeypatch.setattr(loaded_model, "BoomPredictor", noted)
+    monkeypatch.setattr(adjustments, "BoomPredictor", noted)
     return found
 
 

@@ -23,13 +23,12 @@ from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import ODDITIES, SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
 from ...twin.block_update import LoadShedding
-from ...twin.events import EVENTS, TOLD_AT_ONCE
+from ...twin.blocks import EVENTS, TOLD_AT_ONCE
 from ...twin.twin import Twin
 from ...types import NANO, Stream
 from ...types import Clock as StreamClock
-from ..diagnostics_publisher import DiagnosticsPublisher
-from ..runtime import Log, node_name, qos_profile
-from .receive_queue import LARGEST, ReceiveQueue
+from ..receive import LARGEST, ReceiveQueue
+from ..runtime import DiagnosticsPublisher, Log, node_name, qos_profile
 
 
 class GraphPeers:

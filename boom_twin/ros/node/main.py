@@ -61,7 +61,8 @@ def _run(arguments: list[str], stop: StopSignal) -> int:
 
 def _live(node: TwinNode, stop: StopSignal) -> int:
     """Start, spin, stop in order."""
-    from ..runtime import STOPPED, CallbackTurns
+    from ..receive import CallbackTurns
+    from ..runtime import STOPPED
 
     def is_over() -> bool:
         return node.finished or stop.asked or (node.failed and node.autostart)

@@ -24,16 +24,14 @@ from ...messages.mapping import load_mapping
 from ...messages.report_encoder import ReportEncoder
 from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import NODE, Output
-from ...twin.driver import drive_one
-from ...twin.loaded_model import ModelPreparation
+from ...twin.adjustments import ModelPreparation
 from ...twin.twin import Twin
 from ...types import SENSORS, Report, Sample, Stream
+from ..receive import ReceiveQueue
 from ..runtime import Log, message_class, one_line, qos_profile
-from .background_task import BackgroundTask
+from .beside import BackgroundTask, MonitorProcess
 from .diagnostics import Diagnostics
-from .monitor_process import MonitorProcess
 from .parameters import current, declare, frame_of, guard, path_of, refusal
-from .receive_queue import ReceiveQueue
 from .services import Services, StartLog
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -277,9 +275,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._diagnostics.watch.seen(sample.stream, sample.stamp)
         self._preparation.take_in()
         self._twin.shedding.filled(self.queue.share)
-        step = drive_one(self._twin, sample, judged=False)
-        self._diagnostics.watch.took(*step)
-        for each in step.report.all:
+        began = perf_counter()
+        report = self._twin.update(sample, judged=False)
+        self._diagnostics.watch.took(sample, report, perf_counter() - began)
+        for each in report.all:
             if each.change is not None:
                 self._start_log.tell(each, each.change)
             self._publish(each)
