@@ -58,8 +58,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         self._refused = ""
-        # rclpy has no public way to answer a transition that the present state lacks, nor to ask for the state.
-        self._service_change_state.callback = partial(self._change_state, self._service_change_state.callback)
+        transitions = next(each for each in self.services if each.service_name.endswith("/change_state"))
+        transitions.callback = partial(self._change_state, transitions.callback)
         declare(self)
         self._topics = load_mapping(path_of(self, "mapping"))
         self.queue = ReceiveQueue()
@@ -96,7 +96,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             return change(request, response)
         except RuntimeError as error:  # RCLError
             asked = request.transition.label or request.transition.id
-            told = f"transition {asked} refused in state {self._state_machine.current_state[1]}: {one_line(error)}"
+            state = "active" if self._is_active else "inactive" if self._is_configured else "unconfigured"
+            told = f"transition {asked} refused in state {'finalized' if self.finished else state}: {one_line(error)}"
             if told != self._refused:  # not a line for each of many
                 self._log.warning(told)
             self._refused, response.success = told, False
