@@ -83,8 +83,7 @@ class BlockUpdate:
     """Driver of the compiled update, for regular samples.
 
     `channels`: see `boom_twin.types.channels_of`. ``deflected`` and ``unmatched`` are added to `counts`. `shedding` is asked
-    what is left out. One call takes at most `capacity` samples. `before`, of the same scene under another load, gives its
-    arrays.
+    what is left out. One call takes at most `capacity` samples.
     """
 
     def __init__(
@@ -97,7 +96,6 @@ class BlockUpdate:
         counts: Counter[str],
         shedding: LoadShedding,
         capacity: int = ROOM.samples,
-        before: BlockUpdate | None = None,
     ) -> None:
         self._shedding, self._boom, self.limits, self._state, self._channels = shedding, boom, limits, state, channels
         self._judge, self._told_counts = judge, counts
@@ -105,15 +103,11 @@ class BlockUpdate:
         drives = CODES[Stream.STROKES], limits.drive
         self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code not in drives]
         self._capacity, sizes = capacity, (2 * capacity, self._joints, boom.width, boom.stations, limits.channels)
-        self._found: UpdateOutput = new_output(*sizes) if before is None else before._found
-        self._found.counts[:] = 0
+        self._found: UpdateOutput = new_output(*sizes)
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
         self._due: Run | None = None  # whose newest slot is still to be judged
         self._begins_health = False  # before it is told anything
         self._held: _Held | None  # what the compiled code takes with every call
-        is_same = before is not None and before._state is state
-        self._kept: tuple[Any, Any] | None = before._kept if before is not None and is_same else None  # state and output, held
-        self._code: _Code | None = before._code if before is not None and is_same else None
 
     @property
     def limits(self) -> Limits:
@@ -156,13 +150,12 @@ class BlockUpdate:
             self._state.clock[UNMATCHED] = 0
 
     def _hold(self) -> _Held:
-        """Look up the compiled code and prepare the arguments of every call; another load renews few of them."""
-        self._kept = state, found = self._kept or (hold(self._state), hold(self._found))
+        """Look up the compiled code and prepare the arguments of every call."""
+        state, found = hold(self._state), hold(self._found)
         limits, (one, width) = hold(self._limits), (np.zeros(1, np.int64), int(self._limits.channels.max()))
         arguments = *self._boom.held, limits, state
-        if self._code is None:
-            self._code = update.for_types_of(*arguments, one, one, np.zeros((1, width)), 0, False, found)
-        self._held = self._code, arguments, found
+        code = update.for_types_of(*arguments, one, one, np.zeros((1, width)), 0, False, found)
+        self._held = code, arguments, found
         return self._held
 
     def make_room(self) -> None:

@@ -15,7 +15,9 @@ from ..deviation.predictor import BoomPredictor
 from ..errors import BoomTwinError, SolverError
 from ..health.causes import Hypothesis
 from ..health.fault_twins import FaultTwins, Follower
+from ..health.monitor import HealthMonitor
 from ..kernels.tables import SENTENCES
+from ..scene.edit import loaded
 from ..scene.load import SceneSource, as_scene
 from ..types import (
     LIMIT,
@@ -32,7 +34,7 @@ from ..types import (
     channels_of,
     streams_of,
 )
-from .adjustments import LoadedModel, Requests, ResidualBuffer, SensorZeros, limits_of, loaded_model
+from .adjustments import Requests, ResidualBuffer, SensorZeros, limits_of
 from .block_update import BlockUpdate, LoadShedding
 from .blocks import CODES, REGULAR, Note, ReportBlock, SampleBlock, joined
 from .run import Run
@@ -84,7 +86,7 @@ class SampleTaker:
     def _begin(self) -> None:
         self._state = new_state(len(self.scene.joints), np.array(self._widths), self._room)
         self._state.clock[NEWEST] = NONE
-        self._adopt(self._model(self.settings))
+        self._make_model()
         self._run: Run | None = None
         self._is_new = True
         self._failed: int | None = None
@@ -118,29 +120,25 @@ class SampleTaker:
     def _new_lines(self) -> dict[Stream, StampCheck]:
         return {stream: StampCheck(self.settings, self._state, CODES[stream]) for stream in Stream}
 
-    def _model(self, settings: Settings) -> LoadedModel:
-        self._former: BlockUpdate | None = None
-        placed = self.absent, self.places, self.lagging
-        return loaded_model(self.scene, settings, self.mounts, self._health, self.reads, *placed)
-
-    def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
-        """Use this model, which has the present load, in place of that of `before`."""
-        if before is not None:
-            model.boom.filters.lags[:] = self._boom.filters.lags
-        self._boom, self.judge = model.boom, model.judge
-        self._boom.doubt(self._doubted)
-        if self.judge is not None:
-            self.judge.fault_twins = self._fault_twins
-        self.plan = self._boom.plan
-        parts = self._boom, model.limits, self._state, self._channels, self.judge
-        self._former = before  # let go of when the next model is made, which may be in a thread of its own
-        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, self._room.samples, before)
+    def _make_model(self) -> None:
+        """Make the parts of the model that depend on the load."""
+        settings, scene = self.settings, loaded(self.scene, *self.settings.load)
+        boom = BoomPredictor(scene, settings, self.mounts, self.reads, self.places, self.lagging)
+        boom.doubt(self._doubted)
+        judge: HealthMonitor | None = None
+        if self._health:
+            judge = HealthMonitor(scene, settings, self.mounts, self.absent, boom.channels, self.reads, self.places)
+            judge.fault_twins = self._fault_twins
+        self._boom, self.plan, self.judge = boom, boom.plan, judge
+        limits = limits_of(self.scene, boom, settings, self.absent, self.reads)
+        parts = boom, limits, self._state, self._channels, judge
+        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, self._room.samples)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, max(self._widths))))
 
     def _take_over(self, stamp: int) -> list[str]:
         """Apply the requested changes; return the events. Another load, or other zeros of strokes, need a start from rest."""
         asked, before = self.requests, self.settings
-        model, is_new = asked.model, asked.is_new and self._run is not None
+        is_new = asked.is_new and self._run is not None
         from_rest, self.settings = asked.take(), asked.settings
         if is_new:
             self._begin()
@@ -158,7 +156,9 @@ class SampleTaker:
             events += [] if events else ["reset"]
             self._begin_anew_at(stamp)
         if "load" in events:
-            self._adopt(model or self._model(self.settings), self._compiled)
+            lags = self._boom.filters.lags
+            self._make_model()
+            self._boom.filters.lags[:] = lags
         return events
 
     def _begin_anew_at(self, stamp: int) -> None:
@@ -201,9 +201,7 @@ class SampleTaker:
         if run is None:
             return self._follow(sample, values, complete, [])
         if line.is_next(sample.stamp) and sample.stamp - run.newest >= SHORTEST_STEP:
-            if run.plausible.is_of_others(
-                sample.stamp - run.epoch, values, self._boom.extrapolated(0.0), self._compiled.limits
-            ):
+            if run.is_of_others(sample.stamp - run.epoch, values, self._boom.extrapolated(0.0), self._compiled.limits):
                 return self._refuse(sample, "implausible")
             return self._follow(sample, values, complete, [])
         verdict = verdict_on(sample, line, run, self._boom, self._compiled.limits, self.settings, self._zeroed)
@@ -290,9 +288,9 @@ class SampleTaker:
     def _step(self, run: Run, sample: Sample, events: list[str]) -> ReportBlock:
         self._lines[self._drive].take(sample.stamp)
         estimate = self._boom.extrapolated(0.0) if run.is_predicted else None
-        before, rates, check = self._state.strokes, self._boom.speeds, run.plausible
-        taken, oddities = check.of(sample.stamp - run.epoch, sample.values, before, estimate, rates, self._compiled.limits)
-        if check.must_restart and np.isfinite(sample.values).all():
+        before, rates = self._state.strokes, self._boom.speeds
+        taken, oddities = run.checked(sample.stamp - run.epoch, sample.values, before, estimate, rates, self._compiled.limits)
+        if run.must_restart and np.isfinite(sample.values).all():
             self._begin_anew_at(sample.stamp)
             return self._follow(sample, sample.values, True, [*events, "stroke elsewhere"])
         run.is_predicted = True

@@ -7,12 +7,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..config.settings import Settings
 from ..errors import UsageError
 from ..health.monitor import warm_up
 from ..scene.kinematics import strokes_of_angles
 from ..types import SECOND, Array, Change, Clock, Health, Report, Sample, Stream, StrokeReading
-from .adjustments import LoadedModel
 from .blocks import CODES, REGULAR, STREAMS, ReportBlock, SampleBlock, block_of, joined
 from .sample_check import check_units, merged, samples_of
 from .sample_taker import SampleTaker
@@ -131,25 +129,6 @@ class Twin(SampleTaker):
         found = self._recent.zeros_of(sensor, self._run.newest, self._zeros.values, self._boom.slope)
         self.requests.zero(found)
         return found
-
-    def model(self, settings: Settings) -> LoadedModel:
-        """Return the model under the load of `settings`; another thread may call this.
-
-        Parameters
-        ----------
-        settings : Settings
-
-        Returns
-        -------
-        LoadedModel
-            For `requests.tune`.
-
-        Raises
-        ------
-        UsageError
-            The load cannot be.
-        """
-        return self._model(settings)
 
     def zeros(self, channels: Collection[str]) -> tuple[Array, Array]:
         """Return the estimated zeros of sensors of angles, IMU and forces, and their variances.

@@ -24,7 +24,6 @@ from ...messages.mapping import load_mapping
 from ...messages.report_encoder import ReportEncoder
 from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import NODE, Output
-from ...twin.adjustments import ModelPreparation
 from ...twin.twin import Twin
 from ...types import SENSORS, Report, Sample, Stream
 from ..receive import ReceiveQueue
@@ -183,7 +182,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             return twin
 
         def use(twin: Twin) -> None:
-            self._decoder, self._preparation = SampleDecoder(joints, topics), ModelPreparation(twin)
+            self._decoder = SampleDecoder(joints, topics)
             self._encoder = ReportEncoder(scene, settings, frame)
             self._diagnostics.configure(twin, self._decoder, name)
             acknowledge, is_heard = self._diagnostics.watch.acknowledge, lambda: bool(self._subscriptions_in)
@@ -211,7 +210,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         """Start listening, if the node is active and the model is ready."""
         if self._twin is None or not self._is_active:
             return
-        self._preparation.finish()
         self._twin.renew()
         self._diagnostics.start()
         gc.collect()
@@ -231,7 +229,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         asked = {name: value for name, value in live.items() if name in Settings.live_names()}
         if asked and self._twin is not None:
             self.queue.catch_up()
-            self._preparation.tune(asked)
+            self._twin.requests.tune(asked)
 
     def _stop_listening(self) -> None:
         self._is_active = False
@@ -250,7 +248,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self._making.abandon()
         if self._twin is not None:
             self._twin_services.close()
-            self._preparation.close()
         self._twin = None
         if self._page is not None:
             self._page.close()
@@ -274,7 +271,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     def _take(self, sample: Sample) -> None:
         assert self._twin is not None
         self._diagnostics.watch.seen(sample.stream, sample.stamp)
-        self._preparation.take_in()
         self._twin.shedding.filled(self.queue.share)
         began = perf_counter()
         report = self._twin.update(sample, judged=False)
