@@ -124,17 +124,12 @@ class ReceptionWatch:
 
     def __init__(self) -> None:
         self._before: dict[str, Reception] = {}
-        self._left_out: dict[str, int] = {}
 
-    def status(self, judge: ComponentJudge, topics: Mapping[str, Reception], left_out: Mapping[str, int]) -> Status:
-        """Return the status; `left_out` is the total work left out for lack of time, by kind."""
+    def status(self, judge: ComponentJudge, topics: Mapping[str, Reception]) -> Status:
+        """Return the status."""
         for name, each in topics.items():
             self._check(judge, name, each)
-        for name, count in left_out.items():
-            new = count - self._left_out.get(name, 0)
-            told = f"too many messages for the time there is: {name} left out, predictions complete"
-            judge.check(f"{name} left_out", new, Bounds(warn=0), told, at_once=True)
-        self._before, self._left_out = dict(topics), dict(left_out)
+        self._before = dict(topics)
         return judge.finish("all that arrives is read at once")
 
     def _check(self, judge: ComponentJudge, name: str, each: Reception) -> None:

@@ -123,7 +123,6 @@ class TwinWatch:
         clock: float,
         reception: Mapping[str, Reception] | None = None,
         wrong_names: Mapping[Stream, tuple[Level, str]] | None = None,
-        left_out: Mapping[str, int] | None = None,
         words: Mapping[str, str] | None = None,
     ) -> Generator[None, None, list[Status]]:
         """Return the statuses of model, topics, health, sensors and residuals; while `idle`, of the model only.
@@ -142,8 +141,6 @@ class TwinWatch:
             Reception by name of the topic; None if nothing is received live.
         wrong_names : dict of Stream to tuple of Level and str, optional
             Faults of inputs whose messages have names unknown to the scene.
-        left_out : dict of str to int, optional
-            Work left out for lack of time since the node was configured, by kind.
         """
         at = Evaluation(self.thresholds, self._monotonic(), clock)
 
@@ -173,7 +170,7 @@ class TwinWatch:
             streams = {stream: self._streams[Stream(SENSORS[stream].gives or stream)] for stream in publishers}
             followed = {stream: seconds(each.newest) for stream, each in streams.items()}
             found.insert(0, publishers_status(judge("publishers"), publishers, followed))
-            found.append(self._reception.status(judge("reception"), reception, left_out or {}))
+            found.append(self._reception.status(judge("reception"), reception))
         found.append(outputs_status(judge("outputs"), subscribers))
         if self.health is not None:
             found.append(self.health.status(judge("health")))

@@ -195,8 +195,6 @@ class ReceiveQueue:
         Queued messages of all topics.
     oddities : Counter
         Discarded messages of all topics: ``too large`` to be read in time, see `LARGEST`.
-    share : float
-        Waiting messages of the topic read last, relative to its `depth`.
     is_behind : bool
         True if the newest message had waited in the executor, so that more may wait there.
     """
@@ -204,7 +202,7 @@ class ReceiveQueue:
     def __init__(self) -> None:
         self._topics: dict[str, _Topic] = {}
         self._turns: deque[_Topic] = deque()  # topic of each message, by arrival; also of dropped ones
-        self.received, self.is_behind, self.share = 0, False, 0.0
+        self.received, self.is_behind = 0, False
         self.oddities: Counter[str] = Counter()
         self._on_put: Callable[[], None] | None = None
 
@@ -253,7 +251,7 @@ class ReceiveQueue:
                 topic.gone -= 1
                 continue
             arrival, data = topic.waiting.popleft()
-            self.share, wait = len(topic.waiting) / topic.depth, self._since(arrival)
+            wait = self._since(arrival)
             if not wait <= topic.wait:
                 topic.wait = wait
             topic.read(data)

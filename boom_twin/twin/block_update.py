@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from math import inf
 from typing import Any
 
@@ -33,57 +32,15 @@ from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, ROOM, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .update import DONE, LOOK, update
 
-
-@dataclass
-class _UpdateExtras:
-    """Results of one call that are not numbers: `drawn` by row of a prediction, `health` and `events` by row of a sample."""
-
-    drawn: dict[int, Drawn] = field(default_factory=dict)
-    health: dict[int, Health] = field(default_factory=dict)
-    events: dict[int, tuple[str, ...]] = field(default_factory=dict)
-
-
-NO_EXTRAS = _UpdateExtras()
 _Code = Callable[..., tuple[int, int]]  # `update`, compiled for a scene's types
 _Held = tuple[_Code, tuple[Any, ...], Any]  # with boom, limits and state, and output, see `boom_twin.kernels.jit.hold`
-
-
-SHAPES_ABOVE, HEALTH_ABOVE = 0.5, 0.75
-"""Share of the queue of samples that is filled, above which shapes and then health too are left out; at 1 samples are lost."""
-
-
-class LoadShedding:
-    """Decision, by the fill level of the sample queue, what to skip: shapes first, then the judgement of health.
-
-    Predictions, estimates and residuals are never skipped, and do not depend on what is. A sensor that fails meanwhile is
-    detected late: until then the estimate still uses it. A replay has no queue and skips nothing. `shapes` and `health` count
-    what was left out.
-    """
-
-    def __init__(self) -> None:
-        self.shapes = self.health = 0
-        self._share = 0.0
-
-    def filled(self, share: float) -> None:
-        """Set the fill level of the queue, 0 to 1, when the next sample is taken."""
-        self._share = share
-
-    def leaves_out_shape(self) -> bool:
-        """Return True if the shape that is due must be skipped; count it."""
-        self.shapes += (is_due := self._share > SHAPES_ABOVE)
-        return is_due
-
-    def leaves_out_health(self) -> bool:
-        """Return True if the judgement of the rig's health that is due must be skipped; count it."""
-        self.health += (is_due := self._share > HEALTH_ABOVE)
-        return is_due
 
 
 class BlockUpdate:
     """Driver of the compiled update, for regular samples.
 
-    `channels`: see `boom_twin.types.channels_of`. ``deflected`` and ``unmatched`` are added to `counts`. `shedding` is asked
-    what is left out. One call takes at most `capacity` samples.
+    `channels`: see `boom_twin.types.channels_of`. ``deflected`` and ``unmatched`` are added to `counts`. One call
+    takes at most `capacity` samples.
     """
 
     def __init__(
@@ -94,17 +51,19 @@ class BlockUpdate:
         channels: Mapping[Stream, tuple[str, ...]],
         judge: HealthMonitor | None,
         counts: Counter[str],
-        shedding: LoadShedding,
         capacity: int = ROOM.samples,
     ) -> None:
-        self._shedding, self._boom, self.limits, self._state, self._channels = shedding, boom, limits, state, channels
+        self._boom, self.limits, self._state, self._channels = boom, limits, state, channels
         self._judge, self._told_counts = judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
         drives = CODES[Stream.STROKES], limits.drive
         self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code not in drives]
         self._capacity, sizes = capacity, (2 * capacity, self._joints, boom.width, boom.stations, limits.channels)
         self._found: UpdateOutput = new_output(*sizes)
-        self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
+        self._begin, self._told = (0, 0), (0, 0)
+        self._drawn: dict[int, Drawn] = {}  # by row of a prediction
+        self._health: dict[int, Health] = {}  # by row of a sample, as events
+        self._events: dict[int, tuple[str, ...]] = {}
         self._due: Run | None = None  # whose newest slot is still to be judged
         self._begins_health = False  # before it is told anything
         self._held: _Held | None  # what the compiled code takes with every call
@@ -160,7 +119,8 @@ class BlockUpdate:
 
     def make_room(self) -> None:
         """Prepare the next call of the compiled update; pass pending rows to the health monitor when the buffer is full."""
-        self._begin, self._news = tuple(self._found.counts.tolist()), NO_EXTRAS
+        self._begin = tuple(self._found.counts.tolist())
+        self._drawn, self._health, self._events = {}, {}, {}
         if max(self._begin) > self._capacity:
             self._tell_health()
             self._found.counts[:] = 0
@@ -168,20 +128,17 @@ class BlockUpdate:
 
     def _look_around(self, run: Run | None, row: int) -> None:
         clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
-        if self._news is NO_EXTRAS:
-            self._news = _UpdateExtras()
-        news = self._news
         if clock[IS_DEFLECTED]:
-            news.events[row] = ("deflected",)
+            self._events[row] = ("deflected",)
             self._told_counts["deflected"] += 1
         if not clock[BEGINS_SLOT]:
             return
-        if not self._shedding.leaves_out_shape():
-            news.drawn[at] = self._boom.drawn
-        is_doubtful = bool(clock[IS_DEFLECTED])  # what the model is not valid for accuses no sensor
-        if self._judge is not None and (is_doubtful or self._shedding.leaves_out_health()):
+        self._drawn[at] = self._boom.drawn
+        if self._judge is None:
+            return
+        if clock[IS_DEFLECTED]:  # what the model is not valid for accuses no sensor
             self._told = tuple(self._found.counts.tolist())
-        elif self._judge is not None:
+        else:
             self._due = run
 
     @property
@@ -204,7 +161,7 @@ class BlockUpdate:
 
     def _take_judgement(self, row: int) -> None:
         if (health := self.judge()) is not None:
-            self._news.health[row] = health
+            self._health[row] = health
 
     def _tell_health(self, end: float = inf) -> None:
         """Pass the results since the last call to the health monitor, but those from `end` (ns) on."""
@@ -256,11 +213,11 @@ class BlockUpdate:
         columns = found.residual_at, found.residual_streams, found.residual_stamps, found.values, found.sigmas
         residuals = ResidualBlock._make(each[compared].copy() for each in columns)
         return ReportBlock(
-            stamps, predictions, EstimateBlock(row_stamps, found.estimates[predicted].copy()), residuals, self._news.health, {}
+            stamps, predictions, EstimateBlock(row_stamps, found.estimates[predicted].copy()), residuals, self._health, {}
         )
 
     def _outlines(self) -> dict[int, Outline]:
-        drawn = self._news.drawn
+        drawn = self._drawn
         return dict(zip(drawn, self._boom.outlines(list(drawn.values())), strict=True)) if drawn else {}
 
     def rows(self, stamps: Integers, events: Sequence[str] = (), judged: bool = True) -> ReportBlock:
@@ -270,10 +227,10 @@ class BlockUpdate:
         """
         if judged:
             self._take_judgement(len(stamps) - 1)
-        (predicted, compared), news = self._found.counts.tolist(), self._news
+        predicted, compared = self._found.counts.tolist()
         block = self._block(stamps, slice(self._begin[0], predicted), slice(self._begin[1], compared), self._outlines())
         told = {0: tuple(events)} if events else {}
-        notes = {row: Note(events=told.get(row, ()) + news.events.get(row, ())) for row in sorted(told | news.events)}
+        notes = {row: Note(events=told.get(row, ()) + self._events.get(row, ())) for row in sorted(told | self._events)}
         return block._replace(notes=notes)
 
     def no_rows(self, stamp: int, note: Note) -> ReportBlock:
@@ -283,13 +240,11 @@ class BlockUpdate:
 
     def report(self, stamp: int, judged: bool = True) -> Report:
         """Return the report of a regular sample, as `rows` does."""
-        found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
+        found, (predicted, known) = self._found, self._found.counts.tolist()
         residuals = tuple(self._residuals_in(row) for row in range(self._begin[1], known))
         if predicted == self._begin[0]:
             return Report(stamp, True, residuals=residuals)
-        at, outline, events = predicted - 1, None, news.events.get(0, ())
-        if news is not NO_EXTRAS:
-            outline = self._outlines().get(0)
+        at, outline, events = predicted - 1, self._outlines().get(0), self._events.get(0, ())
         prediction = self._boom.prediction_in(found.rows[at].copy(), stamp, outline, found.moments[at].copy())
         health = self.judge() if judged else None
         estimate = estimate_of(stamp, found.estimates[at].copy())

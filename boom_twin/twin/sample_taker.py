@@ -35,7 +35,7 @@ from ..types import (
     streams_of,
 )
 from .adjustments import Requests, ResidualBuffer, SensorZeros, limits_of
-from .block_update import BlockUpdate, LoadShedding
+from .block_update import BlockUpdate
 from .blocks import CODES, REGULAR, Note, ReportBlock, SampleBlock, joined
 from .run import Run
 from .sample_check import SampleCheck
@@ -67,7 +67,6 @@ class SampleTaker:
         self.reads, self._drive, self.absent, scene = reads, reads.stream, frozenset(absent), as_scene(scene)
         self.scene, self.settings, self._health = scene, settings or Settings(), health
         self.counts: Counter[str] = Counter()
-        self.shedding = LoadShedding()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self.places, self.lagging = dict(places), tuple(lagging)
         self._channels = channels_of(len(scene.joints), streams_of(self.places))
@@ -132,7 +131,7 @@ class SampleTaker:
         self._boom, self.plan, self.judge = boom, boom.plan, judge
         limits = limits_of(self.scene, boom, settings, self.absent, self.reads)
         parts = boom, limits, self._state, self._channels, judge
-        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, self._room.samples)
+        self._compiled = BlockUpdate(*parts, self.counts, self._room.samples)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, max(self._widths))))
 
     def _take_over(self, stamp: int) -> list[str]:

@@ -61,8 +61,6 @@ class Twin(SampleTaker):
     requests : Requests
         What is asked while samples come: another load, other limits, a start from rest. It takes effect with the next full
         stroke sample, which `Report.change` tells.
-    shedding : LoadShedding
-        Is told by a live user how full the queue of samples is; decides what is then left out.
     judge : HealthMonitor or None
         Of the rig's health; None without `health`.
 

@@ -22,7 +22,6 @@ from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import ODDITIES, SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
-from ...twin.block_update import LoadShedding
 from ...twin.blocks import EVENTS, TOLD_AT_ONCE
 from ...twin.twin import Twin
 from ...types import NANO, Stream
@@ -129,7 +128,6 @@ class Diagnostics:
         self._preparing_since: float | None = None
         self.watch = TwinWatch({}, {}, Thresholds())  # receives the twin's events. Every `configure` replaces it
         self._counts: dict[str, Mapping[str, int]] = {}
-        self._shedding: LoadShedding | None = None
         self._lags: Callable[[], Mapping[Stream, StreamClock]] = dict
         self._decoder: SampleDecoder | None = None
         self._scene, self._joints = "", 0
@@ -148,7 +146,7 @@ class Diagnostics:
         self.watch = TwinWatch(sensors, self._inputs, self.watch.thresholds, stress=stress)
         self._queue.oddities.clear()
         self._counts = {"samples": twin.counts, "messages": decoder.oddities, "received": self._queue.oddities}
-        self._scene, self._joints, self._decoder, self._shedding = scene, twin.plan.joints, decoder, twin.shedding
+        self._scene, self._joints, self._decoder = scene, twin.plan.joints, decoder
         self._told.clear()
         self._preparing_since = None
 
@@ -196,12 +194,10 @@ class Diagnostics:
         peers = self._peers
         wrong, received = self._wrong_names(), self._queue.look()
         ends = peers.publishers, peers.subscribers.values()
-        shed = self._shedding
-        left_out = {} if shed is None else {"shapes": shed.shapes, "looks at health": shed.health}
         since, idle = self._preparing_since, "" if self._active else NOT_ACTIVE
         if since is not None:
             idle, told["preparing_s"] = PREPARING, time.monotonic() - since
-        found = yield from self.watch.look(told, idle, *ends, clock, received, wrong, left_out, WORDS)
+        found = yield from self.watch.look(told, idle, *ends, clock, received, wrong, WORDS)
         yield
         self._tell_oddities()  # whoever sees a count finds its line in the log
         self._publisher.show(found)

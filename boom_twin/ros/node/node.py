@@ -271,7 +271,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     def _take(self, sample: Sample) -> None:
         assert self._twin is not None
         self._diagnostics.watch.seen(sample.stream, sample.stamp)
-        self._twin.shedding.filled(self.queue.share)
         began = perf_counter()
         report = self._twin.update(sample, judged=False)
         self._diagnostics.watch.took(sample, report, perf_counter() - began)
