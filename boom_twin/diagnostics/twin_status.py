@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -14,15 +14,6 @@ from .levels import ComponentJudge, Evaluation, Level, Status, Value
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, SwingWatch, stress_status
 from .sensor_status import Rows, SensorSpec, StreamWatch, sensor_status
 from .topic_status import Peers, Reception, ReceptionWatch, outputs_status, publishers_status, seconds, topic_status
-
-
-def all_pieces(look: Generator[None, None, list[Status]]) -> list[Status]:
-    """Run all parts of `TwinWatch.look` at once and return its result."""
-    while True:
-        try:
-            next(look)
-        except StopIteration as end:
-            return list(end.value)
 
 
 class TwinWatch:
@@ -124,10 +115,8 @@ class TwinWatch:
         reception: Mapping[str, Reception] | None = None,
         wrong_names: Mapping[Stream, tuple[Level, str]] | None = None,
         words: Mapping[str, str] | None = None,
-    ) -> Generator[None, None, list[Status]]:
+    ) -> list[Status]:
         """Return the statuses of model, topics, health, sensors and residuals; while `idle`, of the model only.
-
-        It yields between parts of one or two milliseconds, so that a live node can take samples.
 
         Parameters
         ----------
@@ -153,12 +142,8 @@ class TwinWatch:
             return found
         sensors, longest = list[Status](), self.thresholds.gap_warn
         for stream, watch in self._streams.items():
-            yield
-            at = Evaluation(self.thresholds, self._monotonic(), clock)
             for sensor, stats in zip(self._sensors[stream], watch.look(longest), strict=True):
                 sensors.append(sensor_status(judge(f"sensor {sensor.name}"), sensor, stats, watch.age_of(stats, at.now)))
-        yield
-        at = Evaluation(self.thresholds, self._monotonic(), clock)
         strokes = self._streams[self._drive].lag
         for stream, watch in self._streams.items():
             if stream not in self._names:
@@ -178,17 +163,14 @@ class TwinWatch:
             found.append(load)
         if self._newest is not None:
             found.append(self._swing.status(judge("swing")))
-        yield
         if self._stress is not None and self._newest is not None and self._newest.prediction is not None:
             bending = judge("bending")
             found.append(stress_status(bending, self._stress, self._newest.prediction, self._newest.estimate))
         rows, self._rows = self._rows, {}
         for names, kept in rows.items():
-            yield
             for name, column in zip(names, kept.table().T, strict=True):
                 window = self._residuals.setdefault(name, ResidualWindow(self._looked))
-                window.take(column, self._monotonic())
-        at = Evaluation(self.thresholds, self._monotonic(), clock)
+                window.take(column, at.now)
         self._looked = at.now
         return found + sensors + [self._residual(judge(f"residual {name}"), name) for name in self._residuals]
 

@@ -136,7 +136,7 @@ class Recording:
         self._samples: list[SampleBlock] = []
         self._alarms = Alarms()
         self._newest: int | None = None
-        self._first = 0
+        self.first = 0  # stamp of the first prediction, ns
         self._count = self._before = 0  # predictions so far, and those in earlier stretches
         self._rows_by_first_clock: int | None = None
         self._whole: Stretch | None = None
@@ -157,7 +157,7 @@ class Recording:
             self._note_time(rows.predictions, row, frozenset(note.events))
         stamps = rows.predictions.stamps
         if len(stamps):
-            self._first = int(stamps[0]) if self._newest is None else self._first
+            self.first = int(stamps[0]) if self._newest is None else self.first
             self._newest = int(stamps[-1])
             self._count += len(stamps)
         for health in rows.health.values():
@@ -188,11 +188,6 @@ class Recording:
         """Return True if nothing was predicted yet."""
         return self._newest is None
 
-    @property
-    def first(self) -> int:
-        """Stamp of the first prediction, ns."""
-        return self._first
-
     def _complete(self) -> None:
         """Make a stretch of what came since the last one, add it to the totals, and give it away or keep it."""
         stretch = self._stretch()
@@ -210,7 +205,7 @@ class Recording:
 
     def _stretch(self) -> Stretch | None:
         parts = [part for part in self._parts if len(part.predictions.stamps) or len(part.residuals.stamps)]
-        own = self._health, self._first, self._samples, self.reads, self._streams
+        own = self._health, self.first, self._samples, self.reads, self._streams
         return Stretch(self._joints, joined(parts), *own) if parts else None
 
     @property
@@ -227,7 +222,7 @@ class Recording:
 
         Steps of a clock that was set are not part of it.
         """
-        span = (self._newest or 0) - self._first
+        span = (self._newest or 0) - self.first
         return (span - sum(after - before for before, after in self.clock_sets)) * NANO
 
     def _by_first_clock(self, before: int) -> slice:

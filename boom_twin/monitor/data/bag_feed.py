@@ -17,7 +17,7 @@ from ...config.settings import Settings, Thresholds
 from ...diagnostics.levels import Status
 from ...diagnostics.sensor_status import sensors_of
 from ...diagnostics.topic_status import Peers
-from ...diagnostics.twin_status import TwinWatch, all_pieces
+from ...diagnostics.twin_status import TwinWatch
 from ...errors import BagError, BoomTwinError
 from ...messages.report_encoder import ReportEncoder
 from ...messages.topic_table import NODE, Output, Topic, Topics
@@ -181,7 +181,7 @@ class TwinView:
             raise BagError(f"{reason}: the scene is of another boom. Give the one of this by --scene.")
 
     def _look(self) -> None:
-        found = all_pieces(self._watch.look(self.twin.counts, "", self._peers, (), self._time))
+        found = self._watch.look(self.twin.counts, "", self._peers, (), self._time)
         store, now = self._feed.store, self._feed.now()
         store.set_statuses(now, store.statuses(now).updated(now, map(_as_message, found), self._time))
         self._looked = self._time
