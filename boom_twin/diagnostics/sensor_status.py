@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from array import array
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isnan, nan
@@ -70,21 +69,6 @@ class Channel:
         )
 
 
-class Rows:
-    """Rows of `width` numbers in plain memory, which Python's garbage collector need not search."""
-
-    def __init__(self, width: int) -> None:
-        self._width, self._numbers = width, array("d")
-
-    def append(self, row: Array) -> None:
-        """Append a row, shape (width,)."""
-        self._numbers.frombytes(row.tobytes())
-
-    def table(self) -> Array:
-        """Return all rows, shape (k, width). No row can be added while the result exists."""
-        return np.frombuffer(self._numbers).reshape(-1, self._width)
-
-
 class StreamWatch:
     """Statistics of one stream, computed when `look` is called. Times are in s, stamps in ns.
 
@@ -106,7 +90,7 @@ class StreamWatch:
         self._heard, self._looked_count, self._least, self.lag = self._monotonic(), self.count, nan, nan
         self._counted = nan, 0
         self._channels = [Channel(*bounds) for bounds in self._ranges]
-        self._stamps, self._values = array("q"), Rows(len(self._channels))  # of samples
+        self._stamps, self._values = list[int](), list[Array]()  # of samples
 
     def seen(self, stamp: int) -> None:
         """Count a message."""
@@ -120,7 +104,7 @@ class StreamWatch:
     def took(self, sample: Sample) -> None:
         """Take the sample of a message. A refused message has none."""
         self._stamps.append(sample.stamp)
-        self._values.append(sample.values)
+        self._values.append(sample.values.copy())
 
     def age(self, now: float) -> float:
         """Return the time since the last message, or since listening began."""
@@ -142,8 +126,8 @@ class StreamWatch:
 
     def look(self, longest: float) -> list[ChannelStats]:
         """Return the statistics of every channel since the last look; `longest` (s) is the largest permitted step of stamps."""
-        stamps, table = np.frombuffer(self._stamps, np.int64), self._values.table()
-        self._stamps, self._values = array("q"), Rows(len(self._channels))
+        stamps, table = np.array(self._stamps, np.int64), np.reshape(self._values, (-1, len(self._channels)))
+        self._stamps, self._values = [], []
         refused = max(0, self.count - self._looked_count - len(stamps))
         self._looked_count = self.count
         self.lag, self._least = self._least, nan
