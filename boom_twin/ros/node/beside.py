@@ -16,7 +16,7 @@ from ..startup import PREPARATION
 
 Result = TypeVar("Result")
 
-LOOK = 0.05  # period of the checks for the end of the work, s
+LOOK_FOR_RESULT = 0.05  # seconds of steady time between looks at whether the work is done
 
 
 class BackgroundTask(Generic[Result]):
@@ -35,7 +35,7 @@ class BackgroundTask(Generic[Result]):
     ) -> None:
         self._node, self._work, self._use, self._give_up = node, work, use, give_up
         self._ended: Callable[[], None] | None = None
-        self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(LOOK_FOR_RESULT, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         Thread(target=self._run, name=PREPARATION, daemon=True).start()
 
     def abandon(self) -> None:
@@ -57,7 +57,7 @@ class BackgroundTask(Generic[Result]):
             self._ended()
 
 
-LOOK = 1.0  # seconds of steady time between looks at whether it still runs
+LOOK_FOR_END = 1.0  # seconds of steady time between looks at whether it still runs
 SERVICES = ("acknowledge", "get_parameters", "scene")
 """Services of the node that are used by the page, or by the recorder that it starts."""
 END_TIMEOUT = 1.0  # seconds that it may take to end
@@ -88,7 +88,7 @@ class MonitorProcess:
             arguments += ["-r", f"{name}:={resolved}"] if resolved != name else []
         command = python_command("boom_twin.cli.main", "monitor", *arguments)
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE)
-        self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(LOOK_FOR_END, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def close(self) -> None:
         """End the process."""
