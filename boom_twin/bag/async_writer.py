@@ -11,7 +11,7 @@ from queue import Empty, SimpleQueue
 from shutil import disk_usage
 from threading import Thread
 
-from ..diagnostics.recorder_status import DiskState
+from ..diagnostics.topic_status import DiskState
 from ..errors import BagError
 from .metadata import Recorded
 from .writer import BagWriter

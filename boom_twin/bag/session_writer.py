@@ -19,7 +19,7 @@ from ..messages.mapping import load_mapping
 from ..messages.topic_table import FRAME, Topics, every_input, factor
 from ..messages.type_store import fill_header, jazzy, new_message
 from ..scene.load import SceneSource
-from ..twin.readings import samples_of as samples_by_name
+from ..twin.sample_check import samples_of as samples_by_name
 from ..types import SECOND, SENSORS, Array, Sample, Stream
 from .async_writer import FileSplit, Storage
 from .session_model import SessionSheet, scene_from
@@ -191,7 +191,7 @@ class SessionWriter:
         BagError
             The disk is full or fails, or does not keep up.
         UsageError
-            Readings by name cannot be used, see `boom_twin.twin.readings.samples_of`.
+            Readings by name cannot be used, see `boom_twin.twin.sample_check.samples_of`.
         """
         samples = samples_by_name(sample, stamp_ns, self._joints) if isinstance(sample, Mapping) else [sample]
         for each in samples:

@@ -23,7 +23,7 @@ from .arguments import add_ros_args, positive, ros_arguments
 from .output import tell, tell_oddities, warn
 
 if TYPE_CHECKING:
-    from ..diagnostics.recorder_status import TopicCount
+    from ..diagnostics.topic_status import TopicCount
     from ..ros.bag.subscriptions import RequestedTopic
 
 

@@ -267,7 +267,7 @@ class ReportEncoder:
         """Return the messages of many reports, equal to those of `fill` for one report after the other."""
         p, residuals, found = block.predictions, block.residuals, EncodedBlockBuilder()
         first = len(self._outputs)  # turn of residuals among the messages of one sample
-        last = first + len(residuals.at)  # of health; shape follows
+        last = first + len(residuals.at)  # of a change; health and shape follow
         if len(p.at):
             shaped = np.zeros(len(p.at), bool)
             shaped[list(p.outlines)] = True
@@ -279,11 +279,14 @@ class ReportEncoder:
             found.add(Output.JOINT_STATES, p.at[shaped], self._predicted - 1, data)
         for rows, data in self._residual_rows(residuals):
             found.add(Output.RESIDUALS, residuals.at[rows], first + rows, data)
+        for row, note in block.notes.items():
+            if note.change is not None:
+                found.add_one(Output.CHANGES, row, last, encode_changes(note.change, self._frame))
         for row, health in block.health.items():
-            for turn, (output, message) in enumerate(self._fill_health(health), start=last):
+            for turn, (output, message) in enumerate(self._fill_health(health), start=last + 1):
                 found.add_one(output, row, turn, message)
         for row in sorted(p.outlines):
-            found.add_one(Output.SHAPE, int(p.at[row]), last + 2, self._markers.fill(p.one(row)))
+            found.add_one(Output.SHAPE, int(p.at[row]), last + 3, self._markers.fill(p.one(row)))
         return found.block(block.stamps)
 
     def _numbers(

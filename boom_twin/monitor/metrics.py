@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
-from ..twin.events import EVENTS
+from ..twin.blocks import EVENTS
 from ..types import SENSORS, Array
 from .data.feed import Feed
 from .data.status import LEVELS, SILENCE, StatusLamp

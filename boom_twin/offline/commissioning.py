@@ -20,10 +20,9 @@ from ..messages.mapping import mapping_from
 from ..messages.topic_table import Sensor, Topics, usual
 from ..scene.edit import loaded
 from ..scene.load import SceneSource
-from ..twin.blocks import CODES, ReportBlock, SampleBlock
-from ..twin.driver import drive_blocks
+from ..twin.blocks import CODES, SampleBlock
 from ..twin.twin import Twin
-from ..types import NO_LAG, SENSORS, Array, Change, Place, Stream, StrokeReading
+from ..types import NO_LAG, SENSORS, Array, Place, Stream, StrokeReading
 from ..wiring.check import STROKES_ALONE, Checked, Verdict, check, finding
 from ..wiring.readings import Channel, Lag, RestModel, Series, Window, is_checked, lag_of
 from .session_samples import SessionSamples
@@ -142,8 +141,8 @@ def commission(
         near = [stream for stream, lag in lags.items() if abs(lag.lag) < MOST_LAG and lag.sigma < math.inf]
         for _ in range(2):  # the second pass estimates lags of late streams only; the others give the time
             twin = Twin(own.scene, *sensing, places=topics.places, lagging=dict.fromkeys([*topics.lagging, *near]))
-            for _step in drive_blocks(twin, _samples(session, topics, window, joints)):
-                pass
+            for block in _samples(session, topics, window, joints):
+                twin.take(block)
             lags |= {stream: Lag(clock.lag, clock.lag_sigma) for stream, clock in twin.clocks.items() if stream in lags}
             near = [stream for stream in near if is_late(lags[stream])]
         for stream, lag in lags.items():
@@ -239,20 +238,17 @@ def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, foun
     """
     raw: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
     left: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
-    for step in drive_blocks(twin, _samples(session, topics, window, len(twin.mounts))):
-        if step is not None:
-            _collect(raw, step[0])
-            for each in step[1]:
-                if isinstance(each, ReportBlock):
-                    _collect(left, each.residuals)
+    for block in _samples(session, topics, window, len(twin.mounts)):
+        _collect(raw, block)
+        _collect(left, twin.take(block).residuals)
     known = {v.stream for v in found.verdicts} - {v.stream for v in found.verdicts if v.is_wrong and not v.is_sure}
     return {each: _lag(raw[each], left[each]) for each in Stream if each in known - UNTIMED and left[each]}
 
 
-def _samples(session: Session, topics: Topics, window: TimeWindow, joints: int) -> Iterator[Any]:
+def _samples(session: Session, topics: Topics, window: TimeWindow, joints: int) -> Iterator[SampleBlock]:
     """Yield the samples of a session, without changes that a node made."""
     wanted = [name for name in topics.heard if (topic := session.find(name)) is not None and topic.count]
-    return (item for item in SessionSamples(session, topics, wanted, joints, window) if not isinstance(item, Change))
+    return (item for item in SessionSamples(session, topics, wanted, joints, window) if isinstance(item, SampleBlock))
 
 
 def _collect(columns: dict[Stream, list[tuple[Array, Array]]], block: SampleBlock | Any) -> None:

@@ -13,7 +13,7 @@ from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import incompleteness
 from ..bag.writer import FILE_NAME as RESULT
 from ..errors import BagError, UsageError
-from ..offline.summary import alarm_as_text
+from ..offline.recording import alarm_as_text
 from ..system.received_files import holds_file, open_received, sha256_of
 from .quantities import Quantity, read
 

@@ -1,8 +1,8 @@
-"""Bounded queue of received messages, so that a flood leaves time for services, timers and diagnostics.
+"""Receive messages without rclpy's queues growing: turns of its executor, and a bounded queue of what arrived.
 
-The executor puts messages here within some microseconds. Between two of its turns, messages are read for a limited time.
-rclpy's events executor calls back once for every arrived message, in one queue with services and timers. So messages are
-taken from it before they are read. If even that is too slow, `boom_twin.ros.runtime.CallbackTurns` drops the executor's queue.
+The executor puts messages into the queue within some microseconds. Between two of its turns, messages are read for a limited
+time. rclpy's events executor calls back once for every arrived message, in one row with services and timers. So messages are
+taken from it before they are read. If even that is too slow, `CallbackTurns` drops the executor's row.
 """
 
 from __future__ import annotations
@@ -11,12 +11,139 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from functools import partial
+from importlib import import_module
+from inspect import Parameter, Signature
 from math import nan
-from typing import Any
+from typing import Any, Self
 
-from ...diagnostics.topic_status import Reception
-from ...types import NANO
-from ..runtime import CallbackTurns, with_information
+from rclpy.clock import Clock, ClockType
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.task import Future
+
+from ..diagnostics.topic_status import Reception
+from ..types import NANO
+from .runtime import STOPPED, Log, one_line
+
+WAKE = 0.2  # time (s) between looks at whether it is over
+LATE = 0.5  # time (s) of work on messages, without a turn of the timers, after which the row of the events executor is too long
+PAUSE = 0.05  # most time (s) between two messages that counts as work on messages: one long callback makes no row
+TURN = 10.0
+"""Time (s) of a turn of the events executor: each leaves 32 bytes behind in rclpy 7.1, half a megabyte in an hour of `WAKE`."""
+
+
+class CallbackTurns:
+    """Turns in which the callbacks of `node` run: until `is_due`, which is asked every `WAKE` s, or until `end`.
+
+    The events executor takes half the processor time, but it is experimental. Its ``spin`` does not return, with a finite wait
+    neither as long as messages come, so a timer ends every turn. It keeps one row of events for messages, services and timers.
+    In a flood of messages that row grows without limit. It is then dropped, see `_drop_row`. Where the events executor is
+    missing or fails, the single-threaded executor goes on. Its turns are at most one callback long.
+    """
+
+    def __init__(self, node: Node, is_due: Callable[[], bool]) -> None:
+        self._node, self._is_due = node, is_due
+        self._turn, self._last = Future(), 0.0
+        self._worked, self._newest = 0.0, time.monotonic()
+        self._executors: list[Callable[[], Any]] = [
+            lambda: import_module("rclpy.experimental").EventsExecutor(),
+            SingleThreadedExecutor,
+        ]
+        self._executor: Any = None
+
+    def __enter__(self) -> Self:
+        self._timer = self._node.create_timer(WAKE, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._release()
+        self._node.destroy_timer(self._timer)
+
+    def is_flooded(self) -> bool:
+        """Return True if messages keep timers and services from their turn; ask at every message."""
+        now = time.monotonic()
+        self._worked, self._newest = self._worked + min(now - self._newest, PAUSE), now
+        return self._worked > LATE
+
+    def run(self) -> None:
+        """Run one turn, of `TURN` s at most."""
+        self._turn, self._last = Future(), time.monotonic() + TURN
+        self._call_back(is_whole=True)
+
+    def poll(self) -> None:
+        """Run the next callback that waits, if one does."""
+        self._call_back(is_whole=False)
+
+    def end(self) -> None:
+        """End the turn that runs."""
+        if not self._turn.done():
+            self._turn.set_result(None)
+
+    def _look(self) -> None:
+        self._worked = 0.0
+        if self._is_due() or time.monotonic() >= self._last:
+            self.end()
+
+    def _call_back(self, is_whole: bool) -> None:
+        try:
+            if self.is_flooded() and len(self._executors) > 1:
+                self._drop_row()
+            if self._executor is None:
+                self._executor = self._executors[0]()
+                self._executor.add_node(self._node)
+            if is_whole and len(self._executors) > 1:
+                self._executor.spin_until_future_complete(self._turn, timeout_sec=TURN)
+            else:
+                self._executor.spin_once(timeout_sec=WAKE if is_whole else 0.0)
+        except STOPPED:
+            raise
+        except Exception as error:
+            if len(self._executors) == 1:
+                raise
+            told = f"events executor: {one_line(error)}; the single-threaded executor goes on, at twice the processor time"
+            Log(self._node).warning(told)
+            self._release()
+            del self._executors[0]
+
+    def _drop_row(self) -> None:
+        """Give up the events executor and its row.
+
+        A new one hears only of what arrives from now on. So the single-threaded executor takes all that waits before.
+        """
+        self._release()
+        depths = [each.qos_profile.depth for each in self._node.subscriptions]
+        interim, left = SingleThreadedExecutor(), sum(depths) + 2 * max(depths, default=0)  # twice for the timers between
+        interim.add_node(self._node)
+        while left > 0 and not self._is_due():
+            interim.spin_once(timeout_sec=0.0)
+            left -= 1
+        interim.remove_node(self._node)
+        self._worked = 0.0
+
+    def _release(self) -> None:
+        if self._executor is not None:
+            self._executor.remove_node(self._node)
+        self._executor = None
+
+
+_BOTH = Signature([Parameter(name, Parameter.POSITIONAL_ONLY) for name in ("data", "info")])
+
+
+def with_information(take: Callable[[bytes, Mapping[str, Any]], None]) -> Callable[..., None]:
+    """Wrap `take` for ``create_subscription(.., raw=True)``, so that it gets a message's information too.
+
+    rclpy tells by the signature that the information is wanted; its events executor (7.1) then gives the two as one argument.
+    `take` is given the encoded message and its information: ``received_timestamp``, ``source_timestamp`` (ns) and
+    ``publication_sequence_number``.
+    """
+
+    def put(*received: Any) -> None:
+        data, info = received if len(received) == 2 else received[0]
+        take(data, info)
+
+    put.__signature__ = _BOTH  # type: ignore[attr-defined]
+    return put
+
 
 FRESH = 0.005  # age (s) of a message from the executor above which more are assumed to wait in the executor's queue
 LARGEST = 1 << 18
@@ -68,8 +195,6 @@ class ReceiveQueue:
         Queued messages of all topics.
     oddities : Counter
         Discarded messages of all topics: ``too large`` to be read in time, see `LARGEST`.
-    share : float
-        Waiting messages of the topic read last, relative to its `depth`.
     is_behind : bool
         True if the newest message had waited in the executor, so that more may wait there.
     """
@@ -77,7 +202,7 @@ class ReceiveQueue:
     def __init__(self) -> None:
         self._topics: dict[str, _Topic] = {}
         self._turns: deque[_Topic] = deque()  # topic of each message, by arrival; also of dropped ones
-        self.received, self.is_behind, self.share = 0, False, 0.0
+        self.received, self.is_behind = 0, False
         self.oddities: Counter[str] = Counter()
         self._on_put: Callable[[], None] | None = None
 
@@ -126,7 +251,7 @@ class ReceiveQueue:
                 topic.gone -= 1
                 continue
             arrival, data = topic.waiting.popleft()
-            self.share, wait = len(topic.waiting) / topic.depth, self._since(arrival)
+            wait = self._since(arrival)
             if not wait <= topic.wait:
                 topic.wait = wait
             topic.read(data)

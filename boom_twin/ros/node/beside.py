@@ -1,16 +1,63 @@
-"""The live page as a child process of the node."""
+"""Work beside the callbacks of a node: in a thread, and the live page in a process."""
 
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Callable
+from threading import Thread
+from typing import Generic, TypeVar
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from ...messages.topic_table import Topics
 from ...system.child_process import end_process, python_command
+from ..startup import PREPARATION
 
-LOOK = 1.0  # seconds of steady time between looks at whether it still runs
+Result = TypeVar("Result")
+
+LOOK_FOR_RESULT = 0.05  # seconds of steady time between looks at whether the work is done
+
+
+class BackgroundTask(Generic[Result]):
+    """Work too long for a callback, done in a thread. A callback of `node` receives its result.
+
+    The thread is a daemon, because a compiler in it cannot be interrupted, see `boom_twin.ros.startup.end_with_preparation`.
+    `use` receives the result of `work`, and `give_up` its exception, both in the executor's thread.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        work: Callable[[], Result],
+        use: Callable[[Result], None],
+        give_up: Callable[[Exception], None],
+    ) -> None:
+        self._node, self._work, self._use, self._give_up = node, work, use, give_up
+        self._ended: Callable[[], None] | None = None
+        self._timer = node.create_timer(LOOK_FOR_RESULT, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        Thread(target=self._run, name=PREPARATION, daemon=True).start()
+
+    def abandon(self) -> None:
+        """Discard the result; the thread ends by itself."""
+        self._node.destroy_timer(self._timer)
+
+    def _run(self) -> None:
+        try:
+            result = self._work()
+        except Exception as error:
+            reason = error  # Python deletes `error` after this block
+            self._ended = lambda: self._give_up(reason)
+        else:
+            self._ended = lambda: self._use(result)
+
+    def _look(self) -> None:
+        if self._ended is not None:
+            self.abandon()
+            self._ended()
+
+
+LOOK_FOR_END = 1.0  # seconds of steady time between looks at whether it still runs
 END_TIMEOUT = 1.0  # seconds that it may take to end
 
 
@@ -37,7 +84,7 @@ class MonitorProcess:
             arguments += ["-r", f"{name}:={resolved}"] if resolved != name else []
         command = python_command("boom_twin.cli.main", "monitor", *arguments)
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE)
-        self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(LOOK_FOR_END, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def close(self) -> None:
         """End the process."""
