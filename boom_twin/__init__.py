@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from .analysis.equilibrium import statics
     from .analysis.frequency_response import frequency_response
     from .analysis.simulate import simulate
+    from .bag.session_file import TimeWindow
     from .bag.session_writer import SessionWriter
-    from .bag.time_window import TimeWindow
     from .config.settings import Settings, load_settings
     from .errors import BagError, BoomTwinError, SceneError, SceneWarning, SolverError, UsageError
     from .monitor.live_page import LivePage
@@ -42,7 +42,7 @@ _NAMES = {
     "analysis.frequency_response": "frequency_response",
     "analysis.simulate": "simulate",
     "bag.session_writer": "SessionWriter",
-    "bag.time_window": "TimeWindow",
+    "bag.session_file": "TimeWindow",
     "config.settings": "Settings load_settings",
     "errors": "BagError BoomTwinError SceneError SceneWarning SolverError UsageError",
     "monitor.live_page": "LivePage",

@@ -92,8 +92,8 @@ def increments_by_tip_force(plan: Plan, state: State, work: Work) -> Array:
     for force in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)):
         clear_cut(work, FREE)
         work.p[0], work.p[1] = -force[0], -force[1]
-        sweep_in(t, state, work, motion, state.drives[0], still, ROOT, last, FREE, work.condensed)
-        sweep_out(t, state, work, work.condensed, ROOT, last, FREE)
+        sweep_in(t, state, work, motion, state.drives[0], still, ROOT, last, FREE)
+        sweep_out(t, state, work, ROOT, last, FREE)
         found.append(work.dz.copy())
     return np.column_stack([one - found[0] for one in found[1:]])
 

@@ -124,7 +124,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     """Return the frequency response at logarithmically even points, and at the natural frequencies among them."""
     from ..analysis.equilibrium import statics
     from ..analysis.frequency_response import UPWARD, frequency_response, with_all_shapes
-    from ..plots.frequency_response import response_picture
+    from ..plots.analysis import response_picture
 
     if not 0.0 < args.low < args.high < float("inf"):
         raise UsageError(f"--from {args.low:g} --to {args.high:g}: frequencies must be above 0 Hz and ascend. Give such.")
@@ -188,7 +188,7 @@ def _resonances(result: FrequencyResponse, static: FrequencyResponse, natural: A
 
 def _steady(scene: Scene, args: Namespace) -> Answer:
     from ..analysis.steady_state import load_of_rows, pump_load, steady_state
-    from ..plots.frequency_response import steady_state_picture
+    from ..plots.analysis import steady_state_picture
 
     if args.pump:
         if args.pump[0] > FASTEST_PUMP:
@@ -234,7 +234,7 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
 
 def _map(scene: Scene, args: Namespace) -> Answer:
     from ..analysis.steady_state import pump_load, resonance_map
-    from ..plots.frequency_response import resonance_picture
+    from ..plots.analysis import resonance_picture
     from ..scene.kinematics import posture_angles
 
     if not args.pump:

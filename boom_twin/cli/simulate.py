@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import UsageError
 from ..scene import Scene
-from ..system.atomic_files import check_new, check_target, write_atomic
+from ..system.atomic_files import check_target, write_atomic
 from ..system.csv_table import CsvTable, columns_text, read_csv
 from ..system.result_text import numbers
 from ..types import Array
@@ -42,7 +42,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_json(parser)
     quick = "step once and say nothing of errors: four to seven times as fast"
     parser.add_argument("--no-error-estimate", action="store_true", help=quick)
-    parser.add_argument("--orbits", metavar="FILE.png", help="picture of the journals in their bushes, at the drive's rows")
     damping = "numerical damping of the fastest vibrations, as what is left of them after a step: 0 to 1 (default 0.8)"
     parser.add_argument("--rho", type=_share, metavar="RHO", help=damping)
 
@@ -56,17 +55,10 @@ def _share(text: str) -> float:
 def run(args: Namespace) -> int:
     """Read, simulate, write."""
     from ..analysis.simulate import RHO, simulate
-    from ..compiler.compile import compile_scene
 
     scene = open_scene(args.scene)
-    if args.orbits and not compile_scene(scene).pins:
-        raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
     sources = files_of(args, "drive", "lengths", "force", "scene")
     check_target(Path(args.out), sources, _is_earlier)
-    if args.orbits:
-        check_new(Path(args.orbits), sources)
-        if Path(args.orbits).resolve() == Path(args.out).resolve():
-            raise UsageError(f"--orbits {args.orbits}: --out writes this file too. Give it another file.")
     times, strokes, stem = read_history(sources[0], len(scene.joints), ("length", "stroke") if args.lengths else ("stroke",))
     pushed = None if args.force is None else _columns(read_csv(Path(args.force), UsageError), FORCE_COLUMNS)
     for oddity in odd_in_drive(times, strokes, stem):
@@ -79,8 +71,6 @@ def run(args: Namespace) -> int:
         warn(f"{doubt}.")
     write_atomic(Path(args.out), columns_text(result.columns()))
     print_result(args.json, as_json(result, args.out), as_text(result, args.out))
-    if args.orbits:
-        _draw_orbits(args, scene, result)
     return 0
 
 
@@ -115,16 +105,6 @@ def as_text(result: Simulation, out: str) -> list[str]:
     ]
     lines += [f"{name}: contact lost {lost} times" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)]
     return [*lines, out]
-
-
-def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:
-    from ..compiler.compile import compile_scene
-    from ..plots.history import Orbits
-    from ..plots.posture import orbits_picture
-
-    gaps = compile_scene(scene).tables.clearances.gap
-    orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
-    orbits_picture(Path(args.orbits), f"{Path(args.drive or args.lengths).name}: journals in their bushes", orbits)
 
 
 def _is_earlier(start: bytes) -> bool:

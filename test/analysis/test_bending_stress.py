@@ -14,8 +14,8 @@ from boom_twin import Sample, Stream, load_scene, simulate
 from boom_twin.analysis.bending_stress import BendingStressModel, increments_by_tip_force, moments_by_unknowns, stations
 from boom_twin.deviation.estimate_row import WIDTH
 from boom_twin.twin.blocks import estimate_of
-from boom_twin.validation.rig.exudyn import solve
-from boom_twin.validation.rig.exudyn.system import Boom, section_frames
+from boom_twin.validation.rig import solve
+from boom_twin.validation.rig.system import Boom, section_frames
 
 SCENE = load_scene()
 ELEMENTS = 24

@@ -266,7 +266,7 @@ class Momenta:
         clear_cut(work, FREE)
         work.p[:2] -= load
         drive, rate, last = state.drives[0], state.drives[1], np.int64(len(t.operations))
-        sweep_in(t, state, work, motion, drive, rate, BEHIND_PIVOT, last, FREE, work.condensed)
+        sweep_in(t, state, work, motion, drive, rate, BEHIND_PIVOT, last, FREE)
         barrel, pin = work.own_g[END_C : END_C + 2], state.pins[0, END_C : END_C + 2] - self._pivot
         friction = torque_of(t, work, t.joints[0], PIVOT) + torque_of(t, work, t.cylinders[0], BARREL_END_PIN)
         moment = pin[0] * barrel[1] - pin[1] * barrel[0] - friction

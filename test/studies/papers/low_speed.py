@@ -81,10 +81,10 @@ def _solve(
             hat[heavy] = (position - _along(plan, state, work, state.z - hat[:unknowns]))[heavy]
         clear_cut(work, FREE)
         motion = Motion(*scheme, hat, offset)
-        status, _, _ = sweep_in(t, state, work, motion, *drive, ROOT, last, FREE, work.condensed)
+        status, _, _ = sweep_in(t, state, work, motion, *drive, ROOT, last, FREE)
         if status != OK:
             raise SolverError(f"a step fails: {SENTENCES[int(status)]}.")
-        sweep_out(t, state, work, work.condensed, ROOT, last, FREE)
+        sweep_out(t, state, work, ROOT, last, FREE)
         state.z[:] += work.dz
         place(t, state, work)
         if np.max(t.scale * np.abs(work.dz)) < STEP_TOLERANCE:

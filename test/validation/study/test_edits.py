@@ -11,7 +11,7 @@ from default_boom import default_text, examine, examine_text, with_end_mark
 from ruamel.yaml import YAML
 
 from boom_twin import Scene, load_scene
-from boom_twin.reduction.variants import KINDS, variants
+from boom_twin.reduction.search import KINDS, variants
 from boom_twin.scene.edit import Edit, edited, rewritten
 
 EDITS = (
