@@ -32,7 +32,7 @@ from .doubts import (
 )
 from .drive import NO_FORCE, DriveCourse, Run, drives_of, force_at
 from .equilibrium import rest_at, travel_words
-from .steady_state import LARGEST_FORCE
+from .steady_state import check_force_rows
 
 RHO = 0.8
 CLOSEST = 1e-6  # s, between rows: rounding of positions over the square of a shorter step is more than 0.01 m/s^2
@@ -238,13 +238,7 @@ def _checked_force(times: Array, force: Array) -> Array:
         force = np.column_stack([times, force])
     if force.ndim != 2 or force.shape[1] != 3 or not len(force):
         raise UsageError(f"force = array of shape {force.shape}: give x and y at every row of times, or rows of t_s, x, y.")
-    for row in np.flatnonzero(~(np.isfinite(force[:, 0]) & (np.abs(force[:, 1:]) <= LARGEST_FORCE).all(axis=1))):
-        at, x, y = force[row]
-        told = f"row {row + 1} of the force: t_s = {at:g}, tip_fx_N = {x:g}, tip_fy_N = {y:g}"
-        raise UsageError(f"{told}: a time must be finite, a force at most {LARGEST_FORCE:g} N. Put it right.")
-    for row in np.flatnonzero(np.diff(force[:, 0]) <= 0.0):
-        told = f"t_s = {force[row + 1, 0]:.9g} s in row {row + 2} of the force"
-        raise UsageError(f"{told}: not after row {row + 1}. Sort the rows.")
+    check_force_rows(force, "force", ("t_s", "tip_fx_N", "tip_fy_N"))
     return force
 
 
