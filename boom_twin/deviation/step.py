@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..kernels.elements.linkage import angle_of_length
 from ..kernels.integrators import X
 from ..kernels.jit import inner, kernel
@@ -45,6 +47,7 @@ from .sensor_model import specific_force
 from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, drive_place, force_place, zero_place
 
 PATIENCE = 1_000_000_000  # ns without readings after which the estimate is the prediction again
+FOLLOW = np.bool_(True)  # of `linearise`, see `boom_twin.kernels.transfer.time_step.ANEW`
 ANGLE_STEP = 0.01  # rad that a joint turns by before the boom is linearised anew
 
 
@@ -78,7 +81,7 @@ def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
     for i in range(n):
         turned = max(turned, abs((f.mean[PREDICTION, drive + i] - p.drives[i]) * p.slope[i]))
     if turned > ANGLE_STEP:
-        status = linearise(t, boom, work, p, f.mean[PREDICTION, drive : drive + n], True)
+        status = linearise(t, boom, work, p, f.mean[PREDICTION, drive : drive + n], FOLLOW)
         if status != OK:
             return status
     if f.status[FED] == 1 and stamp - f.status[FED_STAMP] > PATIENCE:
