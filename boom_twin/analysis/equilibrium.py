@@ -21,7 +21,7 @@ from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_posture
 from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..system.summary_display import SummaryDisplay, numbers
+from ..system.result_text import SummaryDisplay, numbers
 from ..types import Array
 from .doubts import beyond_validity
 from .drive import spring_free
@@ -137,7 +137,7 @@ class Equilibrium(SummaryDisplay):
         return np.array([mode.frequency for mode in self.modes])
 
     def summary_rows(self) -> dict[str, str]:
-        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        """See `boom_twin.system.result_text.SummaryDisplay`."""
         return {
             "tip": f"{numbers(self.tip)} m",
             "deflection": f"{numbers(self.tip - self.tip_rigid, 1e3)} mm",

@@ -19,7 +19,7 @@ from ..plots.results import Trend, trends_picture
 from ..report.fatigue import LIVES, hours_as_text, hours_to_end, yearly_as_text
 from ..report.html import render
 from ..system.atomic_files import write_atomic
-from ..system.json_text import json_text
+from ..system.result_text import json_text
 from ..types import SECOND, sensor_kind
 from .folder import SESSIONS
 from .session_task import OK, Row

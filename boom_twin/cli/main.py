@@ -22,7 +22,7 @@ from typing import NoReturn, Protocol, TextIO, cast
 
 from .. import __version__
 from ..errors import BoomTwinError
-from ..system.cores import use_one_blas_thread
+from ..system.processes import use_one_blas_thread
 from ..system.terminal_text import PrintableStream, open_closed_streams
 from .output import QuietStream
 
