@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 from command import main
 
-from boom_twin.report.compare import ComparedSession, rows_of
-from boom_twin.report.quantities import Quantity
+from boom_twin.report.quantities import ComparedSession, Quantity, rows_of
 
 ONE = ComparedSession(
     "one", "s", [Quantity("x", 1.0, 0.1, "m"), Quantity("y", 1.0, None, "m"), Quantity("only", 2.0, 0.1, "m")], []
