@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, mkdtemp
 
 from .arguments import add_json, add_session, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell, warn
@@ -29,7 +29,7 @@ def run(args: Namespace) -> int:
         def replayed(session: Path) -> Path:
             tell(f"replaying {session} ..")
             scene, settings = open_session_scene(session, args.scene), open_session_settings(session, args.params)
-            (building := Path(folder) / str(len(list(Path(folder).iterdir())))).mkdir()
+            building = Path(mkdtemp(dir=folder))
             evaluated_replay(building, session, scene, settings, ReplayOptions(window=window))
             return building
 
