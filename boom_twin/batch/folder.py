@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..bag.session_sheet import sheet_path
-from ..bag.storages import is_session
+from ..bag.reader import is_session
+from ..bag.session_model import sheet_path
 from ..errors import BagError, UsageError
 from ..system.atomic_files import DRAFT, write_atomic
 from ..system.received_files import real_path

@@ -27,8 +27,8 @@ from ..system.child_process import python_command
 if TYPE_CHECKING:
     from distributed import Client
 
+    from ..bag.session_file import TimeWindow
     from ..bag.session_model import SessionScene
-    from ..bag.time_window import TimeWindow
     from ..config.settings import Settings
     from ..scene.schema import Scene
 
@@ -133,7 +133,7 @@ class SessionTask:
     time: float  # limit, s
     memory: int  # limit of resident memory, bytes
     retries: int  # further attempts if the session fails
-    start: float = 0.0  # of the window, s, see `boom_twin.bag.time_window.TimeWindow`
+    start: float = 0.0  # of the window, s, see `boom_twin.bag.session_file.TimeWindow`
     duration: float | None = None
     calibrate: bool = False  # the scene's parameters from the session as well; that assumes a healthy rig
     fatigue: float | None = None  # detail category, MPa, of the damage of all stations; None: it is not counted
@@ -168,8 +168,8 @@ def _head(task: SessionTask) -> Row:
 def row_of(task: SessionTask) -> Row:
     """Replay a session and return its row; errors are those of `boom_twin.offline.replay.replay`."""
     from ..bag.reader import files_sha256
+    from ..bag.session_file import TimeWindow
     from ..bag.session_model import scene_of, settings_of
-    from ..bag.time_window import TimeWindow
     from ..offline.history import draw
     from ..offline.inputs import ReplayOptions
     from ..report.evaluation import evaluated_replay

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..bag.session_sheet import kept
-from ..config.yaml_text import plain, with_value, yaml_text
+from ..bag.session_model import kept
+from ..config.yaml_text import with_values
 from ..errors import UsageError
 from ..messages.mapping import load_mapping
 from ..messages.topic_table import factor
@@ -62,12 +62,7 @@ def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path
     if not found.zeros:
         return None
     text, zeros = _mapping_text(bag, mapping), _in_readings(found, joints)
-    if "sensors" in (plain(text) or {}):
-        for name, zero in zeros.items():
-            text = with_value(text, ("sensors", name, "zero"), zero)
-    else:
-        rows = [f"  {name}: {yaml_text({'zero': zero})}" for name, zero in zeros.items()]
-        text = "\n".join([*([text.rstrip()] if text.strip() else []), "sensors:", *rows]) + "\n"
+    text = with_values(text, [(("sensors", name, "zero"), zero) for name, zero in zeros.items()])
     head = f"# Zeros of {', '.join(zeros)}: calibrated {credit}.\n"
     path = mapping_path(out)
     write_atomic(path, head + text)

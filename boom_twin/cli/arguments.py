@@ -12,7 +12,7 @@ from ..errors import UsageError
 from ..types import Place, Stream
 
 if TYPE_CHECKING:
-    from ..bag.time_window import TimeWindow
+    from ..bag.session_file import TimeWindow
     from ..scene.schema import Scene
 
 
@@ -57,7 +57,7 @@ def add_session(parser: ArgumentParser, params: bool = True, mapping: bool = Tru
 
 def window_of(args: Namespace) -> TimeWindow:
     """Return the part of a session that the arguments name."""
-    from ..bag.time_window import TimeWindow
+    from ..bag.session_file import TimeWindow
 
     return TimeWindow(args.start, args.duration)
 

@@ -41,7 +41,8 @@ def run(args: Namespace) -> int:
     """Run the calibration, write the scene and print the result; exit code 1 if it must not be used."""
     from ..bag.reader import scan
     from ..calibration.output import as_object, as_text, mapping_path, refuse_overwriting, write_mapping, write_scene
-    from ..calibration.run import Choice, calibrate
+    from ..calibration.run import calibrate
+    from ..calibration.unknowns import Choice
 
     sources = files_of(args, "bags", "scene", "params", "mapping")
     refuse_overwriting(args.out, sources, args.force)

@@ -108,7 +108,6 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "lever_greatest_m": [joint.linkage.lever[1] for joint in joints],
         "transmission_least_deg": [joint.linkage.transmission_deg for joint in joints],
         "nearest_pins_m": [None if joint.linkage.nearest is None else joint.linkage.nearest.distance for joint in joints],
-        "over_pivot": [", ".join(joint.linkage.over_pivot) for joint in joints],
         "oil_stiffness_N_m": [list(joint.k_over_stroke) for joint in joints],
         "left_out": [f"{item.key}: {item.meaning}" for item in account.left_out],
         "warnings": [str(oddity) for oddity in oddities if not oddity.is_note],
@@ -135,7 +134,7 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_masses(account)]
     lines += ["", "Sections", *_sections(account)]
     lines += ["", "Joints and cylinders", *_cylinders(account)]
-    lines += ["", "Joints over their range: lever of the cylinder, angle of the links, pins, what runs over the pivot"]
+    lines += ["", "Joints over their range: lever of the cylinder, angle of the links, nearest pins"]
     lines += _linkages(account)
     if any(joint.k_over_stroke for joint in account.joints):
         lines += ["", "Stiffness of the oil over the stroke, kN/mm", *_over_stroke(account)]
@@ -211,15 +210,15 @@ def _oil(joint: JointAccount) -> str:
 
 
 def _linkages(account: Account) -> list[str]:
-    rows = [["", "lever m", "links meet at", "nearest pins", "over the pivot"]]
+    rows = [["", "lever m", "links meet at", "nearest pins"]]
     for joint in account.joints:
         own = joint.linkage
         links = "-" if own.transmission_deg is None else f"{own.transmission_deg:.0f} deg at least"
         near = own.nearest
         pins = "-" if near is None else f"{near.first}-{near.second} {near.distance:.3f} m at {near.degrees:.0f} deg"
         lever = f"{own.lever[0]:.3f} to {own.lever[1]:.3f}"
-        rows.append([f"joint {joint.number}", lever, links, pins.replace("the ", ""), ", ".join(own.over_pivot) or "-"])
-    return _table(rows, left=5)
+        rows.append([f"joint {joint.number}", lever, links, pins.replace("the ", "")])
+    return _table(rows, left=4)
 
 
 def _over_stroke(account: Account) -> list[str]:

@@ -28,9 +28,8 @@ def run(args: Namespace) -> int:
 
     import numpy as np
 
-    from ..calibration.rest_periods import Rigging
     from ..calibration.run import common_mapping, common_reading
-    from ..calibration.sessions import read_sessions
+    from ..calibration.sessions import Rigging, read_sessions
     from ..plots.results import stabilisation_picture
     from ..report.operational_modes import measured_rests
     from ..system.atomic_files import write_atomic

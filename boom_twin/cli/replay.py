@@ -117,7 +117,7 @@ def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
 def as_text(summary: dict[str, Any]) -> list[str]:
     """Return the lines of a short table."""
     from ..health.sensor_monitor import noise_as_text
-    from ..offline.summary import alarm_as_text
+    from ..offline.recording import alarm_as_text
 
     lines = [
         f"samples            {summary['samples']} in {summary['duration_s']:.1f} s",
@@ -150,7 +150,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
 def count_as_text(name: str, count: int, reads: StrokeReading) -> str:
     """Return in words how often an irregularity was met."""
     from ..messages.sample_decoder import ODDITIES
-    from ..twin.events import event_meaning
+    from ..twin.blocks import event_meaning
 
     meaning = (event_meaning(name, reads) or ODDITIES.get(name, "")).partition(";")[0]
     return f"{count} time{'' if count == 1 else 's'}" + (f": {meaning}" if meaning else "")

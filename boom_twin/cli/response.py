@@ -240,8 +240,7 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
 
 
 def _map(scene: Scene, args: Namespace) -> Answer:
-    from ..analysis.resonance_map import postures_along, resonance_map
-    from ..analysis.steady_state import pump_load
+    from ..analysis.steady_state import postures_along, pump_load, resonance_map
     from ..plots.analysis import resonance_picture
 
     if not args.pump:

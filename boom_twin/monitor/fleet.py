@@ -22,7 +22,7 @@ import numpy as np
 from aiohttp import ClientError, ClientSession, ClientTimeout
 
 from ..errors import UsageError
-from ..twin.events import EVENTS
+from ..twin.blocks import EVENTS
 from ..types import SECOND, SENSORS, Array
 from .data.feed import Feed
 from .data.status import LEVELS, SILENCE, ListedAlarm, StatusLamp

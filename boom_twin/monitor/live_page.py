@@ -13,8 +13,7 @@ from typing import Any, Self
 
 from ..errors import BoomTwinError
 from ..messages.topic_table import Topics, load_topics
-from ..twin.driver import Step
-from ..twin.readings import merged
+from ..twin.sample_check import merged
 from ..twin.twin import Twin
 from ..types import Report, Sample
 from . import PORT
@@ -37,16 +36,16 @@ class SourceFeed(Feed):
     def __init__(self, twin: Twin, topics: Topics) -> None:
         super().__init__("live", Store(CAPACITY), topics, twin.scene)
         self._view = TwinView(self, topics, twin)
-        self._waiting: deque[Step] = deque(maxlen=MOST_WAITING)
+        self._waiting: deque[tuple[Sample, Report]] = deque(maxlen=MOST_WAITING)
 
-    def put(self, step: Step) -> None:
+    def put(self, sample: Sample, report: Report) -> None:
         """Queue a sample and its report for the next poll."""
-        self._waiting.append(step)
+        self._waiting.append((sample, report))
 
     def poll(self) -> None:
         """Show the waiting samples."""
         for _ in range(min(len(self._waiting), MOST_AT_ONCE)):
-            self._view.took(self._waiting.popleft())
+            self._view.took(*self._waiting.popleft())
 
     def now(self) -> float:
         """Return the time (s) of a monotonic clock."""
@@ -96,7 +95,7 @@ class LivePage:
         reports = []
         for each in self._twin.samples(sample, stamp_ns) if isinstance(sample, Mapping) else [sample]:
             reports.append(self._twin.update(each))
-            self._feed.put(Step(each, reports[-1], 0.0))
+            self._feed.put(each, reports[-1])
         return reports[0] if len(reports) == 1 else merged(reports)
 
     def __enter__(self) -> Self:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.cylinder_drives import drives_as_read
+from ..analysis.drive import drives_as_read
 from ..analysis.posture_modes import ModeList
 from ..analysis.undeflected import UndeflectedBoom
 from ..compiler.compile import compile_scene

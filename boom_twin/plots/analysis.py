@@ -9,8 +9,7 @@ import numpy as np
 
 from ..analysis.envelope import Envelope
 from ..analysis.frequency_response import FrequencyResponse
-from ..analysis.resonance_map import ResonanceMap
-from ..analysis.steady_state import SteadyState
+from ..analysis.steady_state import ResonanceMap, SteadyState
 from ..scene.kinematics import skeleton
 from ..scene.schema import Scene
 from ..types import Array, ComplexArray

@@ -112,7 +112,7 @@ class History:
     shapes: list[tuple[float, Array]] = field(default_factory=list)  # deflected centre lines from base to tip, (p, 2), m
     gaps: list[tuple[float, float]] = field(default_factory=list)  # from and to, where strokes were missing
     alarms: list[AlarmSpan] = field(default_factory=list)  # in the order of their beginning
-    moments: Array = field(default_factory=lambda: np.zeros((0, 0)))  # N m at the `boom_twin.analysis.bending_moments.stations`
+    moments: Array = field(default_factory=lambda: np.zeros((0, 0)))  # N m at the `boom_twin.analysis.bending_stress.stations`
     slow_moments: Array = field(default_factory=lambda: np.zeros((0, 0)))  # their static parts
     distributions: SessionDistributions | None = None
     estimate: EstimateTrace | None = None  # None where nothing but strokes was measured

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.column_statistics import ColumnStatistics
-from ..analysis.even_times import power_density, spacing, unbroken
+from ..analysis.sample_series import ColumnStatistics, power_density, spacing, unbroken
 from ..types import Array, sensor_kind
 from .history import Density, History, ResidualDistribution, SessionDistributions
 from .style import BLUE, GREY, INK, ORANGE, PURPLE, SKY, TIME, extent, legend_above, picture, shade_alarms, shade_gaps

@@ -18,8 +18,7 @@ from importlib import import_module
 
 import numpy as np
 
-from ..analysis.bending_moments import Station, stations
-from ..analysis.bending_stress import section_moduli
+from ..analysis.bending_stress import Station, section_moduli, stations
 from ..errors import UsageError
 from ..plots import History
 from ..scene.schema import Scene

@@ -17,7 +17,7 @@ from ..plots.results import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import DEPTH_BY_GYRATION
 from ..system.atomic_files import write_atomic
 from ..texts import alarm_sentence
-from ..twin.events import event_meaning
+from ..twin.blocks import event_meaning
 from ..types import SECOND, SENSORS, Stream
 from .evaluation import Evaluation
 from .fatigue import LIVES, NOISE_RANGE, hours_as_text, hours_to_end, yearly_as_text

@@ -13,13 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.bending_moments import Station, stations
-from ..analysis.bending_stress import BendingStressModel
-from ..bag.session_sheet import incompleteness
-from ..bag.time_window import WHOLE, TimeWindow
+from ..analysis.bending_stress import BendingStressModel, Station, stations
+from ..bag.session_file import WHOLE, TimeWindow
+from ..bag.session_model import incompleteness
 from ..bag.writer import FILE_NAME as RESULT
 from ..errors import BagError, UsageError
-from ..offline.summary import alarm_as_text
+from ..offline.recording import alarm_as_text
 from ..plots import History
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic

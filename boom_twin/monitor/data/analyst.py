@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from scipy.signal import find_peaks
 
-from ...analysis.even_times import power_density, spacing
 from ...analysis.frequency_response import UPWARD, linearised_boom
 from ...analysis.posture_modes import MOVED, ModeList, PresentPosture
-from ...analysis.resonance_map import TOO_MUCH
+from ...analysis.sample_series import power_density, spacing
+from ...analysis.steady_state import TOO_MUCH
 from ...errors import BoomTwinError
 from ...scene.pump_pulses import CHANGE_OVER
 from ...scene.schema import Scene
@@ -74,7 +74,7 @@ def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
     """Return the ranges of pump rates (Hz) at which the tip swings `TOO_MUCH` times as far as at the median rate.
 
     `accelerations` (k,) of the tip (m/s^2) by 1 N are at `RESPONSE_FREQUENCIES`. The rule is that of
-    `boom_twin.analysis.resonance_map`: root mean square for peak to peak.
+    `boom_twin.analysis.steady_state`: root mean square for peak to peak.
     """
     swings = accelerations / (2.0 * np.pi * RESPONSE_FREQUENCIES) ** 2
     at = HARMONICS * PUMP_RATES[:, None]

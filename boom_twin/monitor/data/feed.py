@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...analysis.cylinder_drives import drives_as_read
+from ...analysis.drive import drives_as_read
 from ...compiler.compile import compile_scene
 from ...compiler.plan import Plan
 from ...messages.topic_table import Topics

@@ -8,7 +8,7 @@ from enum import IntEnum
 from math import inf, isfinite, isnan, nan
 from typing import Any
 
-from ...diagnostics.recorder_status import ENDED
+from ...diagnostics.topic_status import ENDED
 from ...health.alarms import evidence_with_cause
 from ...system.terminal_text import printable
 from ...texts import LANGUAGES, alarm_sentence, alarm_text
