@@ -26,7 +26,7 @@ from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
 from ..system.summary_display import SummaryDisplay
 from ..types import Array, ComplexArray
-from .bending_moments import Station, moments_by_unknowns, stations
+from .bending_stress import Station, moments_by_unknowns, stations
 from .equilibrium import rest_at, strokes_and_angles
 from .modal import drive_at_rest
 

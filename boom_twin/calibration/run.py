@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import Mapped, mapping_of, strokes_of
-from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..scene.edit import with_parameters
 from ..scene.schema import Scene
-from ..twin.driver import drive
 from ..twin.twin import Twin
 from ..types import NANO, SENSORS, Array, Residuals, Stream, StrokeReading
 from .fit import CalibrationProblem, Fit, InseparableUnknowns, fitted, groups_of
@@ -239,8 +238,8 @@ def judged(
     """
     twin = Twin(scene, rigging.settings, rigging.mounts, reads=rigging.reads, places=rigging.places)
     found: dict[Stream, list[Residuals]] = {stream: [] for stream in Stream}
-    for step in drive(twin, session.samples(zeros)):
-        for residuals in (each for report in step.report.all for each in report.residuals):
+    for sample in session.samples(zeros):
+        for residuals in (each for report in twin.update(sample).all for each in report.residuals):
             if residuals.stamp >= start:
                 found[residuals.stream].append(residuals)
     every = [residuals for group in found.values() for residuals in group]

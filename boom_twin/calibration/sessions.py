@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bag.joint_names import refuse_other_names
+from ..bag.advice import refuse_conflicts
 from ..bag.reader import Session, check_topic, files_sha256, scan
-from ..bag.time_window import WHOLE, TimeWindow
+from ..bag.session_file import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
 from ..errors import BagError, SolverError
@@ -65,7 +65,7 @@ def read_sessions(paths: Sequence[Path], topics: Topics, joints: int, window: Ti
     """Read sessions, the same window of each; BagError for one of another boom, without its strokes, or that cannot be read."""
     sessions = [scan(path) for path in paths]
     for session in sessions:
-        refuse_other_names(session, topics, joints)
+        refuse_conflicts(session, topics, joints)
     wanted = [_wanted(session, topics) for session in sessions]
     pairs = zip(sessions, wanted, strict=True)
     return [_measured(each, SessionSamples(each, topics, names, joints, window), joints) for each, names in pairs]

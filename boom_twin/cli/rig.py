@@ -110,9 +110,8 @@ def _cylinders(text: str | None, scene: Scene) -> list[tuple[float, float]]:
 
 def run(args: Namespace) -> int:
     """Simulate, sample, write."""
-    from ..bag.session_files import write_session
-    from ..bag.session_model import scene_from
-    from ..bag.session_sheet import RIG_ORIGIN, SessionSheet
+    from ..bag.session_model import RIG_ORIGIN, SessionSheet, scene_from
+    from ..bag.session_writer import samples_of, write_samples
     from ..offline.ground_truth import FILE_NAME
     from ..system.result_folder import RIG, result_folder
     from ..validation.rig import (
@@ -169,8 +168,9 @@ def run(args: Namespace) -> int:
         readings = {"angles": session.joints, "imu": session.imu, "forces": session.forces}
         joints, imu, forces = (values if name in recorded else None for name, values in readings.items())
         placed = {stream: rows for stream, rows in session.placed.items() if stream is not Stream.RATE or "gyro" in recorded}
-        given = session.stamps, session.strokes, joints, imu, notes, session.angle_stamps, forces, placed
-        write_session(building, *given)
+        values = {Stream.STROKES: session.strokes, Stream.ANGLES: joints, Stream.IMU: imu, Stream.FORCES: forces, **placed}
+        there = {stream: rows for stream, rows in values.items() if rows is not None}
+        write_samples(building, samples_of(session.stamps, there, session.angle_stamps), there, notes)
         # not the boom that was simulated: what a twin is to assume
         own = _mapping_text(places, cylinders)
         sheet = SessionSheet(__version__, assumed.text, mapping=own, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.equilibrium import settle
-from ..analysis.methods import integrate_with
+from ..analysis.methods import DURATION, Motion, integrate_with, motion_of
 from ..analysis.modal import natural_modes
-from ..analysis.motions import DURATION, Motion, motion_of
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..errors import SolverError

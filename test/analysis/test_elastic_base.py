@@ -7,13 +7,13 @@ import json
 import numpy as np
 import pytest
 from command import main
+from convergence.balances import energy_balance, momentum_balance
 from default_boom import anew, motion_of, strokes_of_posture
 from oracle import booms
 from oracle.clearance.scenes import with_pins
 from oracle.oscillation import mean_frequency
 
 from boom_twin import UsageError, load_scene, simulate, statics
-from boom_twin.analysis.balances import energy_balance, momentum_balance
 from boom_twin.analysis.methods import Method, integrate_with
 from boom_twin.analysis.simulate import course_of
 

@@ -7,7 +7,7 @@ The journal's centre is offset from the bush's by delta = (x, y). With r = sqrt(
 
 with radial clearance c, speed of approach v at the start of contact, s_i = (1 - nu^2)/E of each body, and radii R_i and
 R_j = R_i + c. K diverges as c vanishes, although the pin becomes ideal. So K uses at least `LEAST_GAP` for R_j - R_i.
-K and the form of F are those of Lankarani and Nikravesh 1990, used in [R] of `boom_twin.scene.notation`. The laws differ in
+K and the form of F are those of Lankarani and Nikravesh 1990, used in [R] of `boom_twin.kernels`. The laws differ in
 chi, a function of the coefficient of restitution. The bracket is at least `LEAST_SHARE`. So contact never pulls, and the
 position of a massless journal stays determined when it leaves. With g' in the bracket the rebound does not depend on the
 smoothing of d. The elastic energy is convex in delta, so a pin at rest has one position.

@@ -11,7 +11,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from ...analysis.motions import DURATION, motion_of
+from ...analysis.methods import DURATION, motion_of
 from ...offline.progress import progress_of
 from ...plots.study import Curve, Panel, error_picture
 from ...scene.schema import Scene

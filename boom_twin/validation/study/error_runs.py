@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.methods import Method, integrate_with
-from ...analysis.motions import Motion
+from ...analysis.methods import Method, Motion, integrate_with
 from ...compiler.compile import BasisName
 from ...errors import BoomTwinError
 from ...scene.schema import Scene

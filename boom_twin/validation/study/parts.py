@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.motions import DURATION
+from ...analysis.methods import DURATION
 from ...errors import SolverError
 from ...reduction.deviation import FREQUENCIES, Response, StrokeCourse, answer, course_of, deviation, step_times, unknowns
 from ...reduction.search import Variant, variants

@@ -10,8 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...analysis.methods import Drive
-from ...analysis.motions import Motion, motion_of
+from ...analysis.methods import Drive, Motion, motion_of
 from ...scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
 from ...scene.load import load_scene
 from ...scene.pump_pulses import ease

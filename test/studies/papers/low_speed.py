@@ -13,7 +13,7 @@ import numpy as np
 from boom_twin import Scene, SolverError
 from boom_twin.analysis.drive import STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import settle
-from boom_twin.analysis.motions import Motion as StrokeMotion
+from boom_twin.analysis.methods import Motion as StrokeMotion
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.compiler.plan import Plan

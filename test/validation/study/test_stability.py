@@ -44,7 +44,6 @@ def test_files_hold_the_verdicts_and_their_symptoms(tmp_path, two_sections):
     text = (tmp_path / "stability.md").read_text()
     assert "| default | 1 | 0 | 0 | 0 | 1 |" in text and "dead centre: beyond (weight on the wrong side): refuses;" in text
     assert "no equilibrium" in text and "carries 0.48" in text
-    assert (tmp_path / "stability.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from oracle import booms
 from oracle.conftest import random_scene
 
 from boom_twin import Scene, load_scene, statics
-from boom_twin.analysis.motions import TURN
+from boom_twin.analysis.methods import TURN
 from boom_twin.cli.study import KINDS
 from boom_twin.reduction import deviation
 from boom_twin.reduction.search import variants
