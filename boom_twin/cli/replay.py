@@ -36,10 +36,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     drawn = parser.add_mutually_exclusive_group()
     drawn.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
     drawn.add_argument("--report", action="store_true", help="write report.html too, to read or to print")
-    heights = (
-        "heights of the sections in m, for the stresses in the report; by default the scene's, else those of thin-walled boxes"
-    )
-    parser.add_argument("--section-height", metavar="H1,H2,..", help=heights)
     purpose = "in the report, fatigue of all stations: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
     parser.add_argument("--fatigue", nargs="?", type=float, const=71.0, metavar="CATEGORY", help=purpose)
     purpose = "write samples.csv or samples.parquet (by pyarrow): predicted, measured, estimated, a row for every stroke stamp"
@@ -52,13 +48,11 @@ def run(args: Namespace) -> int:
     from ..offline.inputs import ReplayOptions
     from ..offline.sample_table import SampleTable, check_kind, columns_of, table_file
     from ..report.evaluation import evaluated_replay
-    from ..report.quantities import section_heights
     from ..system.result_folder import REPLAY, result_folder
 
     if not args.report:
         refuse_given(args, "goes into the report. Give --report too.", "fatigue")
     scene = open_session_scene(args.bag, args.scene)
-    heights = section_heights(args.section_height, scene.scene)
     settings = open_session_settings(args.bag, args.params, args.namespace)
     check_kind(args.table)
     window = window_of(args)
@@ -86,9 +80,7 @@ def run(args: Namespace) -> int:
             with_bag=not args.no_bag,
             causes=args.causes,
         )
-        found = evaluated_replay(
-            building, args.bag, scene, settings, options, heights, args.fatigue, add if args.table else None
-        )
+        found = evaluated_replay(building, args.bag, scene, settings, options, args.fatigue, add if args.table else None)
         files = [path.name for path in _write(args, found, building)]
         for file, table in tables:
             table.finish()
@@ -112,8 +104,9 @@ def flat(summary: dict[str, Any]) -> dict[str, Any]:
 def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
     from ..offline.history import draw
     from ..report.page import write_report
+    from ..report.quantities import FILE_NAME as QUANTITIES
 
-    files = [found.file]
+    files = [out / QUANTITIES]
     if not args.no_pictures:
         files += draw(found.result, found.history, found.scene, out)
     if args.report:

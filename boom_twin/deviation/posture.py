@@ -29,9 +29,9 @@ from ..kernels.jit import by_reference, inner, kernel
 from ..kernels.tables import FRAME_ANGLE, FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, OK, Motion
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
-from ..kernels.transfer.natural_frequency import condense
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from ..kernels.transfer.time_step import ANEW, advance
+from ..kernels.transfer.vibration import condense
 from ..types import Array, StrokeReading
 from .channels import TIP_IMU_STATES, Measurement
 from .sensor_model import Mounting
@@ -235,15 +235,15 @@ def respond_statically(t, boom, work, p):
             for i in range(n):
                 work.drive[i], work.drive_rate[i] = p.closed[i] + p.drives[i], 0.0
             if motion.renew and not loaded:
-                sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE, work.condensed)
+                sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
                 motion = Motion(0.0, 0.0, p.position, p.still, False)
                 clear_cut(work, FREE)
             if k < 2:
                 work.p[k] = -sign * FORCE_SIZE
             else:
                 work.drive[k - 2] += sign * DRIVE_SIZE
-            sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE, work.condensed)
-            sweep_out(t, boom, work, work.condensed, ROOT, operations, FREE)
+            sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
+            sweep_out(t, boom, work, ROOT, operations, FREE)
             size = 2.0 * (FORCE_SIZE if k < 2 else DRIVE_SIZE)
             for i in range(boom.z.shape[0]):
                 p.columns[k, i] = work.dz[i] / size if sign > 0.0 else p.columns[k, i] - work.dz[i] / size
@@ -378,7 +378,7 @@ def respond_to_inertia(t, boom, work, p, j, shift2):
         for i in range(p.hat.shape[0]):
             p.hat[i] = p.position[i] + sign * LOAD * p.motions[j, i]
         condense(t, boom, work, Motion(shift2, 0.0, p.hat, p.still, True), work.drive, work.drive_rate)
-        sweep_out(t, boom, work, work.condensed, ROOT, t.operations.shape[0], FREE)
+        sweep_out(t, boom, work, ROOT, t.operations.shape[0], FREE)
         for i in range(boom.z.shape[0]):
             found = work.dz[i] / (2.0 * LOAD)
             p.response[j, i] = found if sign > 0.0 else p.response[j, i] - found

@@ -18,13 +18,12 @@ from ..twin.twin import Twin
 from ..types import Report, Sample
 from . import PORT
 from .access_control import AccessControl
-from .actions import ViewerActions
 from .data.bag_feed import TwinView
 from .data.feed import Feed
-from .data.received_messages import text
-from .data.status import Severity
+from .data.status import Severity, text
 from .data.store import Store
 from .server import Server, serving
+from .viewer import ACTS, ViewerActions
 
 CAPACITY = 150_000  # rows kept of every table: twelve minutes at 200 Hz
 MOST_WAITING = 20_000  # largest number of waiting samples; beyond it the oldest are dropped
@@ -56,10 +55,6 @@ class SourceFeed(Feed):
         """Show an event at the newest sample."""
         self.store.alarms.add("event", Severity.OK, text(words), self.store.newest, self.store.newest)
 
-    def release_alarms(self) -> str:
-        """Return a refusal: there is no node."""
-        return "there is no node to let go of it"
-
 
 class LivePage:
     """Context manager that serves the live page of a twin from a thread, see `boom_twin monitor`. It needs aiohttp.
@@ -88,12 +83,10 @@ class LivePage:
         The port is taken.
     """
 
-    def __init__(
-        self, twin: Twin, host: str = "127.0.0.1", port: int | None = None, allow: Collection[str] = ("mark", "acknowledge")
-    ) -> None:
+    def __init__(self, twin: Twin, host: str = "127.0.0.1", port: int | None = None, allow: Collection[str] = ACTS) -> None:
         self._twin, self._host, self._port, self.address = twin, host, port, ""
         self._feed = SourceFeed(twin, load_topics().reading(twin.reads))
-        self._actions = ViewerActions(self._feed, frozenset(allow))
+        self._actions = ViewerActions(self._feed, allow)
         self._begun: Future[str] = Future()
         self._thread = Thread(target=self._run, name="live page", daemon=True)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..bag.reader import Session, read
-from ..bag.time_window import WHOLE, TimeWindow
+from ..bag.session_file import WHOLE, TimeWindow
 from ..errors import BagError
 from ..messages.sample_decoder import stamp_of
 from ..messages.topic_table import Topics

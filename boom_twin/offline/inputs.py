@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..bag.joint_names import refuse_missing_drive, refuse_other_names
+from ..bag.advice import refuse_conflicts
 from ..bag.reader import Session, read, scan
+from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import (
     SessionScene,
     SessionStrokes,
@@ -20,7 +21,6 @@ from ..bag.session_model import (
     settings_of,
     strokes_of,
 )  # fmt: skip
-from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..health.wiring_monitor import KIND as WIRING
@@ -129,8 +129,7 @@ def replay_inputs(
         name for name, topic in topics_there.items() if drive in topics.heard[name] or (topic is not None and topic.count)
     ]
     strokes = strokes_of(session.path, mapped)
-    refuse_missing_drive(session, topics)
-    refuse_other_names(session, topics, len(joints), kept.source)
+    refuse_conflicts(session, topics, len(joints), kept.source)
     streams = tuple(
         stream
         for stream in streams_of(topics.places)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.column_statistics import ColumnStatistics
+from ..analysis.sample_series import ColumnStatistics
 from ..deviation.load_spectrum import TipLoad, TipLoadFinder
 from ..health.alarms import Alarms, evidence_with_cause
 from ..system.received_files import sha256_of

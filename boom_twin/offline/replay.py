@@ -15,9 +15,8 @@ import numpy as np
 
 from .. import __version__
 from ..bag.reader import Session
-from ..bag.session_model import SessionScene, scene_from
-from ..bag.session_sheet import SessionSheet
-from ..bag.time_window import WHOLE, TimeWindow
+from ..bag.session_file import WHOLE, TimeWindow
+from ..bag.session_model import SessionScene, SessionSheet, scene_from
 from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
 from ..errors import BagError
@@ -164,8 +163,8 @@ def replay(
         options = ReplayOptions(progress, mapping, changes, health, window, namespace, with_bag, causes)
         if is_path:
             return replay_into(building, bag, scene, settings, options)
-        from ..loggers.column_file import ColumnFile
-        from ..loggers.import_session import import_session
+        from ..bag.import_session import import_session
+        from ..loggers.assignment import ColumnFile
         from ..loggers.log_table import table_of_frame
 
         kept, place = scene_from(scene), building / SESSION

@@ -14,13 +14,10 @@ from typing import TypeVar
 import numpy as np
 
 from ..bag.reader import Session, read, read_blocks
-from ..bag.session_blocks import SessionBlocks
-from ..bag.session_file import PARSE_ERRORS
-from ..bag.time_window import WHOLE, TimeWindow
+from ..bag.session_file import PARSE_ERRORS, WHOLE, SessionBlocks, TimeWindow
 from ..bag.writer import RESULT_CHUNK_SIZE, MessageWriter
 from ..config.settings import Settings
-from ..messages.cdr_decoder import CdrDecoder, stamp_in
-from ..messages.message_block import MessageBlock
+from ..messages.cdr_decoder import CdrDecoder, MessageBlock, stamp_in
 from ..messages.report_encoder import ReportEncoder, decode_changes
 from ..messages.sample_decoder import SampleDecoder
 from ..messages.topic_table import TYPES, Output, Topic, Topics

@@ -15,7 +15,7 @@ from recordings import read, scan
 from ros_messages import load_topics
 
 from boom_twin import BagError, Sample, Settings, Stream, load_scene, replay
-from boom_twin.bag.session_files import write_samples
+from boom_twin.bag.session_writer import write_samples
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers

@@ -72,7 +72,7 @@ def peak_of(part: ReportBlock, samples: SampleBlock, times: int, monkeypatch: py
     """Peak of memory, bytes, and what comes out of a session that repeats `part`."""
     monkeypatch.setattr(recording, "STRETCH", 2000)
     monkeypatch.setattr(history, "MOST_ROWS", 8192)
-    evaluator = Evaluator(load_scene(), Settings())
+    evaluator = Evaluator(load_scene())
     held = Recording(4, evaluator.add)
     tracemalloc.start()
     for k in range(times):

@@ -11,8 +11,8 @@ from types import SimpleNamespace
 from typing import Any
 
 from ...bag.reader import Session, read
+from ...bag.session_file import WHOLE, TimeWindow
 from ...bag.session_model import SessionScene
-from ...bag.time_window import WHOLE, TimeWindow
 from ...config.settings import Settings, Thresholds
 from ...diagnostics.levels import Status
 from ...diagnostics.sensor_status import sensors_of

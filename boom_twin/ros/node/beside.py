@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from ...messages.topic_table import NODE, Topics
+from ...messages.topic_table import Topics
 from ...system.child_process import end_process, python_command
 from ..startup import PREPARATION
 
@@ -58,8 +58,6 @@ class BackgroundTask(Generic[Result]):
 
 
 LOOK_FOR_END = 1.0  # seconds of steady time between looks at whether it still runs
-SERVICES = ("acknowledge", "get_parameters", "scene")
-"""Services of the node that are used by the page, or by the recorder that it starts."""
 END_TIMEOUT = 1.0  # seconds that it may take to end
 
 
@@ -78,8 +76,6 @@ class MonitorProcess:
         own_names, names_there = ([*each.inputs.values(), *each.outputs.values(), each.events] for each in (topics, there))
         pairs = zip(names_there, own_names, strict=True)
         names = {one.name: node.resolve_topic_name(other.name) for one, other in pairs}
-        own = f"{namespace.rstrip('/')}/{NODE}"
-        names |= {f"{own}/{name}": node.resolve_service_name(f"~/{name}") for name in SERVICES}
         arguments = ["--until-stdin-ends"]
         for option, path in (("--mapping", mapping), ("--scene", scene)):
             arguments += [option, path] if path else []

@@ -13,7 +13,7 @@ from rclpy.duration import Infinite
 from rclpy.node import Node
 from rclpy.qos import LivelinessPolicy, QoSCompatibility, QoSProfile, qos_check_compatible
 
-from ...bag.joint_names import extra_names_message, strange_names_message
+from ...bag.advice import extra_names_message, strange_names_message
 from ...config.settings import Thresholds
 from ...diagnostics.levels import Level, Value
 from ...diagnostics.model_status import stress_model

@@ -32,13 +32,12 @@ from bench.record import keep
 from default_boom import with_parameters
 
 from boom_twin import Twin, load_scene
-from boom_twin.bag.session_files import samples_of
+from boom_twin.bag.session_writer import samples_of
 from boom_twin.health.alarms import Alarms
 from boom_twin.twin.blocks import block_of
 from boom_twin.types import NANO, Stream
 from boom_twin.validation.rig import Scheme, Sensors, at_rest, move, observe, random_programme
-from boom_twin.validation.rig.faults import parse, spoil
-from boom_twin.validation.rig.faulty_boom import changes, wrong_by
+from boom_twin.validation.rig.faults import changes, parse, spoil, wrong_by
 from boom_twin.validation.rig.loads import PumpLoad, WindLoad, tip_load
 from boom_twin.validation.rig.motion import Programme
 

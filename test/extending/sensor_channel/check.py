@@ -11,10 +11,9 @@ from matplotlib.axes import Axes
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, replay
 from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_samples
-from boom_twin.calibration.rest_periods import Rigging
-from boom_twin.calibration.sessions import read_sessions
-from boom_twin.calibration.validation import judged
+from boom_twin.bag.session_writer import write_samples
+from boom_twin.calibration.run import judged
+from boom_twin.calibration.sessions import Rigging, read_sessions
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
