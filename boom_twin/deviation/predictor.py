@@ -358,12 +358,12 @@ class BoomPredictor:
         return float(self.filters.evidence[0])
 
     @property
-    def tip_load(self) -> tuple[Array, Array]:
-        """Estimated force at the tip that the model does not know (N), and its variances, shape (2,) each."""
+    def tip_loads(self) -> tuple[Array, Array]:
+        """Force at the tip that the model does not know, predicted and estimated (N), and variances, shape (2, 2) each."""
         fast = 2 * int(self.posture.modes[0]) + np.arange(2)
-        mean, spread = self.filters.mean[ESTIMATE], self.filters.spread[ESTIMATE]
-        variances = spread[fast, fast] + 2.0 * spread[fast, fast + 2] + spread[fast + 2, fast + 2]
-        return mean[fast] + mean[fast + 2], variances
+        mean, spread = self.filters.mean, self.filters.spread
+        variances = spread[:, fast, fast] + 2.0 * spread[:, fast, fast + 2] + spread[:, fast + 2, fast + 2]
+        return mean[:, fast] + mean[:, fast + 2], variances
 
     @property
     def tip_sigmas(self) -> Array:

@@ -155,7 +155,7 @@ class BlockUpdate:
         if run is None or self._judge is None:
             return None
         self._tell_health(run.newest // SLOT * SLOT)
-        health = self._judge.judge(run.newest, self._boom.tip_load, lambda: self._boom.tip_sigmas)
+        health = self._judge.judge(run.newest, self._boom.tip_loads, lambda: self._boom.tip_sigmas)
         self._boom.leave_out(self._judge.suspected, self._judge.failing_strokes)
         return health
 
