@@ -64,7 +64,8 @@ class Posture(NamedTuple):
     frames, absolute, sways : (n,) of angle sensors, see `Mounting`. roots : (n + 1,)
     frames of the pivots and of the tip. masses : (h,) kg, kg m^2. lengths : (n,) of the sections, m. closed : (n,) m.
     channels, sites, errors, psi, weights, bending : see `boom_twin.deviation.channels.Measurement`.
-    behind : (1,) states that the estimate has beside those of the prediction.
+    behind : (1,) states of sensors' errors that the estimate has beside those of the prediction. delayed : (1,) copies of late
+    readings behind these, see `boom_twin.deviation.delayed`.
     The other fields are scratch; `rate` (n,) stays zero.
     """
 
@@ -104,6 +105,7 @@ class Posture(NamedTuple):
     weights: Array
     bending: Array
     behind: NDArray[np.int64]
+    delayed: NDArray[np.int64]
     still: Array
     position: Array
     hat: Array
@@ -136,7 +138,8 @@ def new_posture(
         tilt=np.where(mounting.absolute, inclination, 0.0), gravity=np.array(plan.tables.gravity), slope=np.zeros(n),
         curvature=np.zeros(n), frames=mounting.frames.astype(np.int64), absolute=mounting.absolute, sways=mounting.sways,
         roots=roots.astype(np.int64), masses=plan.masses,
-        lengths=lengths, closed=plan.closed_lengths, **measured._asdict(), behind=np.array([TIP_IMU_STATES + 2 * n]),
+        lengths=lengths, closed=plan.closed_lengths, **measured._asdict(),
+        behind=np.array([TIP_IMU_STATES + 2 * n]), delayed=np.zeros(1, np.int64),
         still=np.zeros(histories), position=np.zeros(histories), hat=np.zeros(histories),
         response=np.zeros((most, unknowns)), sides=np.zeros((2, width)),
         shifted=np.zeros((most, histories)), small=np.zeros((4, most, most)), target=np.zeros(n), rate=np.zeros(n),

@@ -336,6 +336,7 @@ class BoomPredictor:
     def rebase(self, shift: int) -> None:
         """Shift stamps by `shift` (ns) from now on."""
         self.filters.status[FED_STAMP] += shift
+        self.filters.instants[:] += shift
 
     def add_phase(self, prediction: Prediction) -> None:
         """Add the phase uncertainty of the vibration in `prediction` after a pause of unknown length.
