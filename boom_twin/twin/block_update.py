@@ -276,10 +276,8 @@ class BlockUpdate:
         residuals = tuple(self._residuals_in(row) for row in range(self._begin[1], known))
         if predicted == self._begin[0]:
             return Report(stamp, True, residuals=residuals, events=tuple(events))
-        at, outline = predicted - 1, None
-        if news is not NO_EXTRAS:
-            outline, events = self._outlines().get(0), (*events, *news.events.get(0, ()))
-        prediction = self._boom.prediction_in(found.rows[at].copy(), stamp, outline, found.moments[at].copy())
+        at, events = predicted - 1, (*events, *news.events.get(0, ()))
+        prediction = self._predictions(slice(at, predicted)).one(0)
         health = self.judge() if judged else None
         estimate = estimate_of(stamp, found.estimates[at].copy())
         return Report(stamp, True, prediction, residuals, tuple(events), health=health, estimate=estimate)
