@@ -14,6 +14,7 @@ from .rows import clear, difference, read, spread_of
 from .states import ALL_OPEN, ALL_VALVES, DELAYED, ESTIMATE, FED, PREDICTION, all_states, copy_place
 
 FEWEST_INSTANTS = 4  # that have room, else a further late stream is left out
+NEAREST = 4e6  # ns from one instant to the next, at least: a tenth of the period of the fastest mode
 EARLIEST = -(2**62)  # ns
 
 
@@ -61,7 +62,7 @@ def instant_beyond(f, count, stamp):
 def begin_instant(p, f, stamp):
     """Make room for the copies at the newest instant; return its first state, -1 without late streams.
 
-    The newest instant is replaced if it is so near to the one before that the room would not last for the latest stream.
+    The newest instant is replaced if it is nearer than `NEAREST` to the one before, or so near that the room would not last.
     """
     width = copy_width(f)
     if width == 0 or f.status[FED] == 0:
@@ -74,7 +75,7 @@ def begin_instant(p, f, stamp):
         second = instant_to(f, count, f.instants[newest] - 1)
         oldest = instant_beyond(f, count, EARLIEST)
         following = instant_beyond(f, count, f.instants[oldest])
-        if f.instants[newest] - f.instants[second] < longest / (room - 2):
+        if f.instants[newest] - f.instants[second] < max(NEAREST, longest / (room - 2)):
             at = newest
         elif count == room or f.instants[following] < stamp - longest:
             at = oldest
