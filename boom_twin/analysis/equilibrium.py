@@ -23,8 +23,8 @@ from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
 from ..system.summary_display import SummaryDisplay, numbers
 from ..types import Array
-from .cylinder_drives import spring_free
 from .doubts import beyond_validity
+from .drive import spring_free
 from .modal import Mode, constraints, natural_modes, negative_pivots
 
 CLAMP = 1e12  # N/m, stiffness of a practically ideal pin

@@ -63,7 +63,7 @@ def _side(args: Namespace, path: Path, building: Path, name: str) -> ComparedSes
 
 
 def _draw(out: Path, one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> None:
-    from ..plots.session import compare_picture
+    from ..plots.results import compare_picture
     from ..report.compare import SIGNIFICANT
 
     known = [(row.name, row.difference / row.sigma) for row in rows if row.sigma and row.difference is not None]

@@ -115,7 +115,7 @@ def _report(result: Envelope, quantities: list[Quantity]) -> list[str]:
 
 
 def _write(folder: Path, result: Envelope, quantities: list[Quantity], values: dict[str, Any], scene: Scene) -> None:
-    from ..plots.envelope import envelope_picture
+    from ..plots.analysis import envelope_picture
 
     (folder / "envelope.csv").write_text(_csv(result, quantities), encoding="utf-8")
     (folder / "envelope.json").write_text(json_text(values) + "\n", encoding="utf-8")

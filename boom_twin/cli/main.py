@@ -79,7 +79,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "simulate": (
         "simulate my_boom.yaml --drive examples/strokes.csv --out motion.csv",
         "simulate --drive examples/strokes.csv --force examples/tip_force.csv --out pushed.csv",
-        "simulate --drive examples/strokes.csv --out spread.csv --samples 100 --vary cylinder_2.k=0.1",
     ),
     "replay": (
         "replay bags/arch_session --out out/replay --report",

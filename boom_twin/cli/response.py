@@ -128,7 +128,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     """Return the frequency response at logarithmically even points, and at the natural frequencies among them."""
     from ..analysis.equilibrium import statics
     from ..analysis.frequency_response import UPWARD, frequency_response, with_all_shapes
-    from ..plots.frequency_response import response_picture
+    from ..plots.analysis import response_picture
 
     if not (0.0 < args.low < args.high < float("inf") and 2 <= args.points <= 1_000_000):
         raise UsageError(
@@ -195,7 +195,7 @@ def _resonances(result: FrequencyResponse, static: FrequencyResponse, natural: A
 
 def _steady(scene: Scene, args: Namespace) -> Answer:
     from ..analysis.steady_state import load_of_rows, pump_load, steady_state
-    from ..plots.frequency_response import steady_state_picture
+    from ..plots.analysis import steady_state_picture
 
     if args.pump:
         if args.pump[0] > FASTEST_PUMP:
@@ -240,9 +240,8 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
 
 
 def _map(scene: Scene, args: Namespace) -> Answer:
-    from ..analysis.resonance_map import postures_along, resonance_map
-    from ..analysis.steady_state import pump_load
-    from ..plots.frequency_response import resonance_picture
+    from ..analysis.steady_state import postures_along, pump_load, resonance_map
+    from ..plots.analysis import resonance_picture
 
     if not args.pump:
         raise UsageError("--map needs --pump RATE:HEIGHT, the pulses whose rate it varies. Add --pump 0.4:130.")

@@ -11,8 +11,8 @@ import math
 from ..kernels.jit import inner
 from ..kernels.tables import Motion
 from ..kernels.transfer.forward_kinematics import place
-from ..kernels.transfer.natural_frequency import condense
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, sweep_out
+from ..kernels.transfer.vibration import condense
 
 NUDGE = 1e-6  # rad, largest change of an unknown that derivatives of positions are taken over
 LOAD = 1e-9  # m, displacement whose inertia loads the boom in a step of subspace iteration
@@ -90,7 +90,7 @@ def respond_to_inertia(t, boom, work, p, j, shift2):
         for i in range(p.hat.shape[0]):
             p.hat[i] = p.position[i] + sign * LOAD * p.motions[j, i]
         condense(t, boom, work, Motion(shift2, 0.0, p.hat, p.still, True), work.drive, work.drive_rate)
-        sweep_out(t, boom, work, work.condensed, ROOT, t.operations.shape[0], FREE)
+        sweep_out(t, boom, work, ROOT, t.operations.shape[0], FREE)
         for i in range(boom.z.shape[0]):
             found = work.dz[i] / (2.0 * LOAD)
             p.response[j, i] = found if sign > 0.0 else p.response[j, i] - found

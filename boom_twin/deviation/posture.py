@@ -226,15 +226,15 @@ def respond_statically(t, boom, work, p):
             for i in range(n):
                 work.drive[i], work.drive_rate[i] = p.closed[i] + p.drives[i], 0.0
             if motion.renew and not loaded:
-                sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE, work.condensed)
+                sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
                 motion = Motion(0.0, 0.0, p.position, p.still, False)
                 clear_cut(work, FREE)
             if k < 2:
                 work.p[k] = -sign * FORCE_SIZE
             else:
                 work.drive[k - 2] += sign * DRIVE_SIZE
-            sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE, work.condensed)
-            sweep_out(t, boom, work, work.condensed, ROOT, operations, FREE)
+            sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
+            sweep_out(t, boom, work, ROOT, operations, FREE)
             size = 2.0 * (FORCE_SIZE if k < 2 else DRIVE_SIZE)
             for i in range(boom.z.shape[0]):
                 p.columns[k, i] = work.dz[i] / size if sign > 0.0 else p.columns[k, i] - work.dz[i] / size

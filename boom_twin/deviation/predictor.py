@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.bending_moments import moments_by_unknowns
+from ..analysis.bending_stress import moments_by_unknowns
 from ..analysis.equilibrium import outline, settle
 from ..analysis.modal import natural_modes
 from ..analysis.undeflected import UndeflectedBoom

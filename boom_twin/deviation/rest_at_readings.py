@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis.cylinder_drives import spring_free
+from ..analysis.drive import spring_free
 from ..analysis.equilibrium import settle
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan, first_row, taken_apart

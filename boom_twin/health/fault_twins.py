@@ -45,7 +45,7 @@ class Follower(Protocol):
     def requests(self) -> Any:
         """Requested changes that wait for the next stroke sample."""
 
-    def update_block(self, block: Any, /) -> object:
+    def take(self, block: Any, /) -> object:
         """Take the samples of a block."""
 
     def zeros(self, channels: Collection[str], /) -> tuple[Array, Array]:
@@ -318,7 +318,7 @@ class FaultTwins:
 def _feed(twin: Follower, each: Hypothesis, second: _Second) -> None:
     if second.left_out is not None:
         twin.leave_out(*second.left_out)
-    twin.update_block(_in_time(second.block, each))
+    twin.take(_in_time(second.block, each))
 
 
 def _in_time(block: Any, each: Hypothesis) -> Any:

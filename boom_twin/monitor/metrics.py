@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import UsageError
-from ..twin.events import EVENTS
+from ..twin.blocks import EVENTS
 from ..types import SENSORS, Array
-from .alarm_watch import AlarmWatch
 from .data.feed import Feed
 from .data.status import LEVELS, SILENCE, StatusLamp
 from .data.store import EVERY_STROKE, Table
 from .data.topic_rows import COMPARED, ESTIMATE, ESTIMATE_COLUMNS, RESIDUALS
+from .webhook import AlarmWatch
 
 WINDOW = 10.0  # window (s) of the root mean square of residuals
 AXES = ("x", "z")

@@ -9,11 +9,11 @@ from math import hypot
 from pathlib import Path
 from typing import Any
 
-from ..bag.session_sheet import incompleteness
-from ..bag.time_window import WHOLE, TimeWindow
+from ..bag.session_file import WHOLE, TimeWindow
+from ..bag.session_model import incompleteness
 from ..bag.writer import FILE_NAME as RESULT
 from ..errors import BagError, UsageError
-from ..offline.summary import alarm_as_text
+from ..offline.recording import alarm_as_text
 from ..system.received_files import holds_file, open_received, sha256_of
 from .quantities import Quantity, read
 
@@ -112,7 +112,7 @@ def as_text(one: ComparedSession, other: ComparedSession, rows: list[ComparisonR
         mark = {True: "differs", False: "", None: "?"}[row.is_significant]
         lines.append(f"{row.name:32s}{numbers} {_number(row.sigma):>10s}  {row.unit:6s} {mark}".rstrip())
     lines += ["", f"differs: by more than {SIGNIFICANT:g} standard deviations; ?: it is not known how sure the figures are"]
-    lines.append("damping, peaks, moments and travel also differ where postures and moves do")
+    lines.append("damping, peaks and moments also differ where postures and moves do")
     for letter, side in (("A", one), ("B", other)):
         lines.append(f"alarms of {letter}, {side.name}: {len(side.alarms) or 'none'}")
         lines += [f"  {alarm_as_text(alarm)}" for alarm in side.alarms]

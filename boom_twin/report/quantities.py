@@ -13,20 +13,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis.bending_moments import Station, stations
-from ..analysis.bending_stress import BendingStressModel
-from ..config.settings import Settings
-from ..errors import BagError, UsageError
+from ..analysis.bending_stress import BendingStressModel, Station, stations
+from ..errors import BagError
 from ..plots import History
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import open_received
-from ..types import SENSORS, Array, Stream, sensor_kind, stream_of
+from ..types import Array, Stream, sensor_kind, stream_of
 from .vibration import RestPeriod
 
 FILE_NAME = "quantities.json"
 BATCHES = 10  # number of batches for the standard deviation of a mean (method of batch means)
-LEG = 1e-3  # reversal (m) of a stroke that begins a new leg
 MODEL_ERROR: dict[Stream | None, float] = {Stream.ANGLES: 5e-5, Stream.IMU: 0.02}
 """Standard deviation of the model error of a reading in one posture, by stream; rad, m/s^2."""
 FREQUENCY_ERROR = 0.01  # relative standard deviation of the model's natural frequencies in one posture
@@ -49,7 +46,6 @@ class QuantityBuilder:
         self._scene = scene
         self._channels: dict[str, tuple[BatchMeans, BatchMeans]] = {}  # means of values and of squares
         self._displacement = self._acceleration = 0.0
-        self._travels = [PathLength() for _ in scene.joints]
         self.loads = SectionLoads(scene)
 
     def add(self, history: History, load: Array, variance: Array) -> None:
@@ -61,11 +57,9 @@ class QuantityBuilder:
             squares.add(values**2)
         self._displacement = max(self._displacement, float(np.hypot(*history.tip_displacement.T).max()))
         self._acceleration = max(self._acceleration, float(np.hypot(*history.tip_acceleration.T).max()))
-        for travel, stroke in zip(self._travels, history.strokes.T, strict=True):
-            travel.add(stroke)
         self.loads.add(history, load, variance)
 
-    def quantities(self, tip_sigma: float | None, rests: list[RestPeriod], settings: Settings) -> list[Quantity]:
+    def quantities(self, tip_sigma: float | None, rests: list[RestPeriod]) -> list[Quantity]:
         """Return all quantities; `tip_sigma` is the largest standard deviation of the predicted tip, m, or None."""
         return [
             *self._residuals(),
@@ -76,7 +70,6 @@ class QuantityBuilder:
                 Quantity(f"bending_moment_max_section_{section + 1}", moment, None, "N m")
                 for section, moment in self.loads.moments.items()
             ),
-            *self._stroke_travels(settings),
         ]
 
     def _residuals(self) -> Iterator[Quantity]:
@@ -95,13 +88,6 @@ class QuantityBuilder:
                 rms_error = hypot(square_sigma, 2.0 * mean * error) / (2.0 * rms) if rms else 0.0
             yield Quantity(f"residual_mean_{name}", mean, mean_error, unit)
             yield Quantity(f"residual_rms_{name}", rms, rms_error, unit)
-
-    def _stroke_travels(self, settings: Settings) -> Iterator[Quantity]:
-        for i, travel in enumerate(self._travels):
-            length, legs = travel.length
-            yield Quantity(
-                f"stroke_travel_cylinder_{i + 1}", length, sqrt(2.0 * legs * settings.variance(SENSORS[Stream.STROKES])), "m"
-            )
 
 
 class BatchMeans:
@@ -143,36 +129,6 @@ def _weighted(name: str, rows: Array, error: float) -> Quantity:
     mean = float(weights @ rows[:, 0] / weights.sum())
     scatter = float(weights @ (rows[:, 0] - mean) ** 2 / max(len(rows) - 1, 1))
     return Quantity(name, mean, hypot(sqrt(max(1.0, scatter) / weights.sum()), error), "1")
-
-
-class PathLength:
-    """Total travel of a stroke, and its number of legs. Reversals smaller than `LEG` are ignored as noise."""
-
-    def __init__(self) -> None:
-        self._begin: float | None = None
-        self._extreme, self._way = 0.0, 0
-        self._travel, self._legs = 0.0, 0
-
-    def add(self, stroke: Array) -> None:
-        """Add the next stroke values (m), shape (k,), k >= 1."""
-        begin = float(stroke[0]) if self._begin is None else self._begin
-        extreme, way = begin if self._begin is None else self._extreme, self._way
-        for value in stroke.tolist():
-            if way and (extreme - value) * way > LEG:
-                self._travel, self._legs = self._travel + abs(extreme - begin), self._legs + 1
-                begin, extreme, way = extreme, value, -way
-            elif not way and abs(value - begin) > LEG:
-                extreme, way = value, 1 if value > begin else -1
-            elif way and (value - extreme) * way > 0.0:
-                extreme = value
-        self._begin, self._extreme, self._way = begin, extreme, way
-
-    @property
-    def length(self) -> tuple[float, int]:
-        """Travel so far (m), and number of legs."""
-        if not self._way or self._begin is None:
-            return 0.0, 0
-        return self._travel + abs(self._extreme - self._begin), self._legs + 1
 
 
 def write(folder: Path, scene: Scene, found: list[Quantity]) -> Path:
@@ -245,14 +201,11 @@ class SectionLoads:
             found[section] = max(found.get(section, 0.0), abs(own.moment))
         return found
 
-    def most_loaded(self, heights: Array | None) -> list[Load]:
-        """Return the load of every station, that of the largest stress first.
-
-        `heights` (n,) are the section heights, m. None: those of the scene, else those of thin-walled boxes.
-        """
+    def most_loaded(self) -> list[Load]:
+        """Return the load of every station, that of the largest stress first; see `BendingStressModel`."""
         if not self._largest:
             return []
-        model, found = BendingStressModel(self._scene, heights), []
+        model, found = BendingStressModel(self._scene), []
         for column, own in self._largest.items():
             unknown = sigma = math.nan
             if own.load.any():
@@ -273,17 +226,3 @@ class _Largest(NamedTuple):
     joints: Array  # rad
     load: Array  # N, estimated at the tip
     variance: Array  # N^2, of `load`
-
-
-def section_heights(text: str | None, scene: Scene) -> Array | None:
-    """Return the section heights (m) from ``h1,h2,..``; raise UsageError unless every section has one above 0."""
-    if text is None:
-        return None
-    count = len(scene.sections)
-    try:
-        heights = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        heights = np.zeros(0)
-    if len(heights) != count or not (np.isfinite(heights) & (heights > 0.0)).all():
-        raise UsageError(f"--section-height {text}: give {count} heights above 0, in m, with commas between them.")
-    return heights

@@ -38,45 +38,6 @@ def on_stop_signal(act: Callable[[], None]) -> None:
         signal.signal(each, stop)
 
 
-class InterruptedWorkError(KeyboardInterrupt):
-    """Interruption of work that took too long to end by itself.
-
-    It is a subclass because a plain KeyboardInterrupt inside ``exec`` (dataclasses use it) ends the process as killed by
-    SIGINT, even if it is caught.
-    """
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    sys.unraisablehook = _nothing  # finalisers of half-made objects would print errors
-    raise InterruptedWorkError
-
-
-def _nothing(unraisable: object) -> None:
-    """Report nothing."""
-
-
-class StopSignal:
-    """Stop request by one of `STOPS`: checked between callbacks; KeyboardInterrupt if a callback takes too long.
-
-    rclpy reports an exception inside a callback as a fault of the callback. Use this only in a process without unsaved data.
-    """
-
-    LONGEST = 0.5  # time (s) allowed to a callback before it is interrupted
-
-    def __init__(self) -> None:
-        self.asked = False  # True after a signal
-        on_stop_signal(self._ask)
-
-    def _ask(self) -> None:
-        self.asked = True
-        signal.signal(signal.SIGALRM, _interrupt)
-        signal.setitimer(signal.ITIMER_REAL, self.LONGEST)
-
-    def over(self) -> None:
-        """Interrupt nothing from now on, because the process is ending."""
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-
-
 def end_with_preparation(code: int) -> int:
     """Return the exit code; if the thread `PREPARATION` still works, end the process with it here.
 

@@ -19,7 +19,6 @@ from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import OK
 from ..types import NANO
-from .regular import SMOOTHING, are_strokes_regular, is_regular, note_stamp
 from .state import (
     BEGINS_SLOT,
     COUNT,
@@ -28,10 +27,14 @@ from .state import (
     IS_DEFLECTED,
     NEWEST,
     SLOT,
+    SMOOTHING,
     STATUS,
     UNMATCHED,
     WAITING,
+    are_strokes_regular,
+    is_regular,
     new_row,
+    note_stamp,
     zeros_at,
 )  # fmt: skip
 

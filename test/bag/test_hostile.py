@@ -24,7 +24,7 @@ from boom_twin import BagError, Stream
 from boom_twin.bag import mcap_file, mcap_records
 from boom_twin.bag.mcap_records import LARGEST_SUMMARY
 from boom_twin.bag.metadata import FILE_NAME as METADATA
-from boom_twin.bag.session_sheet import FILE_NAME as SHEET
+from boom_twin.bag.session_model import FILE_NAME as SHEET
 from boom_twin.config.yaml_text import plain
 from boom_twin.offline import ground_truth as truth
 
@@ -200,7 +200,7 @@ def bomb(file: Path, content: bytes, compression: str, crc: int) -> Path:
 def test_recovery_of_a_bomb_takes_little_memory(tmp_path: Path, compression: str, is_summed: bool) -> None:
     zeros = bytes(LARGEST_SUMMARY)
     path = bomb(tmp_path / "bomb.mcap", zeros, compression, zlib.crc32(zeros) if is_summed else 0)
-    words = refused_in_little_memory(tmp_path, "recover", path, "--out", tmp_path / "out", "--unverified")
+    words = refused_in_little_memory(tmp_path, "recover", path, "--out", tmp_path / "out")
     assert "there is none" in words
     assert not (tmp_path / "out").exists()
 

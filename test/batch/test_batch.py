@@ -188,7 +188,7 @@ def test_only_a_batch_is_gone_on_with(sessions: Path, tmp_path: Path, capsys: py
 def test_no_scheduler_answers(
     sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("boom_twin.batch.cluster.CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr("boom_twin.batch.session_task.CONNECT_TIMEOUT", 0.5)
     assert main(["batch", str(sessions / "s0"), "--out", str(tmp_path / "o"), "--scheduler", "tcp://127.0.0.1:1"]) == 1
     assert "no Dask scheduler answers" in capsys.readouterr().err
 

@@ -34,7 +34,7 @@ from default_boom import strokes_of_posture
 from recordings import read, recover, scan, write_session
 
 from boom_twin import BagError, load_scene
-from boom_twin.bag.session_sheet import incompleteness
+from boom_twin.bag.session_model import incompleteness
 
 PATIENCE = 300.0
 STEP = 5_000_000

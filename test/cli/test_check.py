@@ -32,7 +32,7 @@ def test_check_explains_the_default_scene(capsys: pytest.CaptureFixture[str]) ->
         "Warnings: none",
     ):
         assert words in out, words
-    assert "total      48" in out
+    assert "Unknowns per step: 48\n  joints    20  2 + 6 + 6 + 6\n  sections  28  8 + 8 + 8 + 4\n" in out
 
 
 @pytest.mark.parametrize(("end", "code"), [("\n", 0), ("", 1)], ids=["whole line", "cut line"])

@@ -98,7 +98,7 @@ class Follower:
     def __init__(self, rate):
         self.evidence, self.changes, self._rate = 0.0, [], rate
 
-    def update_block(self, block):
+    def take(self, block):
         """Take a second of samples."""
         self.evidence += self._rate(int(block.stamps[0]) // SECOND)
 

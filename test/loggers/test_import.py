@@ -17,9 +17,9 @@ from recordings import read, scan
 from ruamel.yaml import YAML
 
 from boom_twin import Sample, Stream, load_scene, replay, statics
-from boom_twin.bag.session_files import write_samples
-from boom_twin.bag.session_sheet import kept
-from boom_twin.loggers.column_file import load_columns
+from boom_twin.bag.session_model import kept
+from boom_twin.bag.session_writer import write_samples
+from boom_twin.loggers.assignment import load_columns
 
 STREAMS = {"cylinder_strokes": Stream.STROKES, "joint_angles": Stream.ANGLES, "tip_imu": Stream.IMU}
 

@@ -15,7 +15,7 @@ from ros_messages import TYPES, Output, load_topics
 
 from boom_twin import BagError, Settings, TimeWindow, UsageError, load_scene, replay, statics
 from boom_twin.analysis.posture_modes import ModeList
-from boom_twin.monitor.data.analyst import ResponseList
+from boom_twin.monitor.data.analyst import RateList
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
 from boom_twin.monitor.data.status import Severity, overall
@@ -85,8 +85,8 @@ def test_the_posture_is_that_of_the_drives_whatever_transducers_read(reads: Stro
         assert drives == pytest.approx(rest.strokes, abs=1e-5)
         assert feed.strokes_between(0.0, 0.4)[-1] == pytest.approx(drives, abs=1e-5)
         assert ModeList(scene).at(drives) == pytest.approx(rest.frequencies, rel=2e-4)
-    response, expected = (ResponseList(scene).at(each).accelerations for each in (drives, rest.strokes))
-    assert np.linalg.norm(response - expected) < 1e-3 * np.linalg.norm(expected)
+    found, expected = (RateList(scene).at(each).avoid for each in (drives, rest.strokes))
+    assert np.array(found) == pytest.approx(np.array(expected), abs=0.006)
 
 
 def test_alarms_are_those_of_the_summary_and_of_the_result_bag(feed: Feed, published: Feed, replayed: Path) -> None:

@@ -21,10 +21,10 @@ from monitor.test_monitor_server import Made, serve
 from boom_twin import Settings, load_scene
 from boom_twin.monitor import webhook as webhooks
 from boom_twin.monitor.access_control import AccessControl
-from boom_twin.monitor.actions import ViewerActions
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.server import Server
+from boom_twin.monitor.viewer import ViewerActions
 from boom_twin.monitor.webhook import Webhook
 from boom_twin.texts import alarm_text
 from boom_twin.types import Alarm

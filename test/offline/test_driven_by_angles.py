@@ -14,7 +14,7 @@ from recordings import load_mapping, load_truth, read, scan
 from ros_messages import SampleDecoder, load_topics, stamp_of
 
 from boom_twin import BagError, Sample, Stream, Twin, replay
-from boom_twin.bag.session_files import write_samples
+from boom_twin.bag.session_writer import write_samples
 from boom_twin.types import StrokeReading
 
 BAGS = Path(__file__).parents[2] / "bags"

@@ -15,11 +15,11 @@ from recordings import read, scan
 from ros_messages import load_topics
 
 from boom_twin import BagError, Sample, Settings, Stream, load_scene, replay
-from boom_twin.bag.session_files import write_samples
+from boom_twin.bag.session_writer import write_samples
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
-from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
+from boom_twin.diagnostics.twin_status import TwinWatch
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.protocol import layout
 from boom_twin.offline.history import HistoryBuilder
@@ -77,7 +77,7 @@ def test_residuals_zeros_and_diagnostics(scene, samples):
     assert values.mean(axis=0) == pytest.approx([0.0, WRONG, 0.0, 0.0], abs=20.0)
     assert values.std(axis=0) == pytest.approx(SIGMA, rel=0.15)
     assert np.all(sigmas >= SIGMA)
-    looked = all_pieces(watch.look({}, "", {stream: Peers(name) for stream, name in names.items()}, (), now))
+    looked = watch.look({}, "", {stream: Peers(name) for stream, name in names.items()}, (), now)
     statuses = {status.name: status.message for status in looked}
     assert all(statuses[f"sensor {name}"] == "measuring" for name in CHANNELS)
     assert {"cylinder_forces", *(f"residual {name}" for name in CHANNELS)} <= set(statuses)

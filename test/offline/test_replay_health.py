@@ -9,7 +9,7 @@ from recordings import read, scan, write_session
 from ros_messages import Output, load_topics
 
 from boom_twin import load_scene, replay
-from boom_twin.offline.summary import alarm_as_text
+from boom_twin.offline.recording import alarm_as_text
 
 START, STEP = 1_700_000_000_000_000_000, 5_000_000
 

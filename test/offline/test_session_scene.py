@@ -15,10 +15,10 @@ from recordings import MessageWriter, SessionSheet, scan, scene_of
 from ros_messages import fill_header, load_topics, new_message
 
 from boom_twin import BagError, Settings, Stream, load_scene, replay
-from boom_twin.bag.session_sheet import FILE_NAME, sha256
+from boom_twin.bag.session_model import FILE_NAME, sha256
 from boom_twin.cli.output import warn_incomplete
-from boom_twin.diagnostics.boom_mismatch import OtherBoom
 from boom_twin.monitor.data.bag_feed import bag_feed
+from boom_twin.offline.inputs import OtherBoom
 from boom_twin.scene.load import DEFAULT_NAME
 from boom_twin.types import Alarm, Health
 

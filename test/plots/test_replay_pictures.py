@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.plots import History, ImuTrace, Truth, replay_pictures, tip
-from boom_twin.plots.session_distributions import density
+from boom_twin.plots import History, ImuTrace, Truth, replay_pictures, session
+from boom_twin.plots.residuals import density
 from boom_twin.types import Array
 
 ALL = ["tip.png", "residuals.png", "posture.png", "spectrum.png"]
@@ -101,8 +101,8 @@ def test_a_spectrum_has_the_power_of_its_sine() -> None:
 
 
 def test_the_title_tells_the_error_against_the_truth(tmp_path: Path, figures_of: Callable[..., list[Any]]) -> None:
-    figures, told = figures_of(tip), history(2, seconds=3.0)
+    figures, told = figures_of(session), history(2, seconds=3.0)
     truth = Truth(told.stamps_s, told.tip_position + np.array([0.03, 0.04]), told.tip_acceleration)
-    tip.tip_picture(tmp_path / "tip.png", "test", told, truth, "")
+    session.tip_picture(tmp_path / "tip.png", "test", told, truth, "")
     titles = [axes.get_title(loc="left") for axes in figures[0].axes]
     assert titles[0].endswith("rms error: prediction 50 mm") and titles[1].endswith("rms error: prediction 0 m/s²")

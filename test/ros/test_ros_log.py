@@ -19,8 +19,8 @@ from std_msgs.msg import String, UInt8
 from std_srvs.srv import Trigger
 
 from boom_twin.diagnostics.levels import Level, Status
-from boom_twin.ros import runtime
-from boom_twin.ros.diagnostics_publisher import DiagnosticsPublisher
+from boom_twin.ros import receive
+from boom_twin.ros.runtime import DiagnosticsPublisher
 
 HOSTILE = "/rig\x1b[2J\n[INFO] [boom_twin]: all is well\u202e\x9b31m"
 ESCAPED = r"/rig\x1b[2J\n[INFO] [boom_twin]: all is well\u202e\x9b31m"
@@ -47,7 +47,7 @@ def test_states_with_foreign_names_are_escaped_and_those_that_come_and_go_do_not
     assert logged.count(f"publishers: followed: {ESCAPED}") == 1 and HOSTILE not in logged
 
     now, lines = [1000.0], Lines()
-    monkeypatch.setattr("boom_twin.ros.diagnostics_publisher.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("boom_twin.ros.runtime.time.monotonic", lambda: now[0])
     board._logger = lines  # type: ignore[assignment]
 
     def shown(*levels: Level) -> list[str]:
@@ -71,9 +71,9 @@ def test_messages_come_with_their_information_and_turns_end_when_due(
     if is_missing:
         monkeypatch.delattr(rclpy.experimental, "EventsExecutor")
     node, came = rclpy.create_node("turns"), list[Mapping[str, Any]]()
-    node.create_subscription(String, "text", runtime.with_information(lambda data, info: came.append(info)), 10, raw=True)
+    node.create_subscription(String, "text", receive.with_information(lambda data, info: came.append(info)), 10, raw=True)
     publisher, end, due, sent = node.create_publisher(String, "text", 10), time.monotonic() + 60.0, 0.0, 0
-    with runtime.CallbackTurns(node, lambda: time.monotonic() >= due) as running:
+    with receive.CallbackTurns(node, lambda: time.monotonic() >= due) as running:
         while len(came) < 3 and time.monotonic() < end:
             if publisher.get_subscription_count() and sent < 3:
                 publisher.publish(String(data="x" * 100))
@@ -87,7 +87,7 @@ def test_messages_come_with_their_information_and_turns_end_when_due(
 
 def test_nothing_is_lost_with_a_row_that_is_dropped(domain: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every turn drops the row of the one before; messages and requests stood in it."""
-    monkeypatch.setattr(runtime, "LATE", -1.0)
+    monkeypatch.setattr(receive, "LATE", -1.0)
     node, peer, came, end = rclpy.create_node("turns"), rclpy.create_node("peer"), list[int](), time.monotonic() + 60.0
     qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
     node.create_subscription(UInt8, "number", lambda message: came.append(message.data), qos)
@@ -97,7 +97,7 @@ def test_nothing_is_lost_with_a_row_that_is_dropped(domain: None, monkeypatch: p
         assert time.monotonic() < end
         time.sleep(0.05)
     answers = []
-    with runtime.CallbackTurns(node, lambda: False) as running:
+    with receive.CallbackTurns(node, lambda: False) as running:
         running.poll()
         for number in range(60):
             publisher.publish(UInt8(data=number))

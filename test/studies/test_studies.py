@@ -14,7 +14,7 @@ from studies.roundoff.exact_step import digits, one_step
 from studies.roundoff.report import TARGET, TURN_UP_STEPS, turn_up
 
 from boom_twin import load_scene
-from boom_twin.validation.study.long_booms import long_boom
+from boom_twin.validation.study.scenes import long_boom
 
 SCENE = load_scene()
 

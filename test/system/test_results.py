@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from boom_twin import BagError
-from boom_twin.bag.session_sheet import incompleteness
+from boom_twin.bag.session_model import incompleteness
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.system.result_folder import RECOVER, REPLAY, RIG, ResultKind, result_folder
 

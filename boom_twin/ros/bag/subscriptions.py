@@ -11,7 +11,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from ...bag.metadata import Recorded
 from ...bag.writer import recorded
-from ...config.yaml_text import plain, with_value
+from ...config.yaml_text import with_values
 from ...errors import UsageError
 from ...messages.topic_table import NODE, Qos, Topic, Topics
 from ...messages.type_store import jazzy
@@ -165,7 +165,7 @@ def resolved_mapping(text: str, topics: Topics, node: Any) -> str:
 
 def with_mapped(text: str, place: tuple[str, ...], value: str) -> str:
     """Return the text of a mapping with another value at one place."""
-    return with_value(text if plain(text) else "{}", place, value)
+    return with_values(text, [(place, value)])
 
 
 def subscription_of(node: Any, wanted: RequestedTopic) -> tuple[Any, QoSProfile, Recorded] | None:

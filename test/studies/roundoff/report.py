@@ -13,10 +13,9 @@ from boom_twin import Scene
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.analysis.simulate import RHO
 from boom_twin.system.atomic_files import write_atomic
-from boom_twin.validation.study import scene_changes as made
-from boom_twin.validation.study.long_booms import long_boom, seven_sections
+from boom_twin.validation.study import scenes as made
 from boom_twin.validation.study.report import page, table
-from boom_twin.validation.study.stability.cases import short, smooth
+from boom_twin.validation.study.stability_cases import short, smooth
 
 from .exact_step import StepRoundoff, digits, one_step
 from .pictures import roundoff_picture
@@ -44,7 +43,7 @@ def losses(scene: Scene, quick: bool = False) -> list[Loss]:
 
 def _by_count(counts: tuple[int, ...]) -> Iterator[Loss]:
     for count in counts:
-        boom = long_boom(count)
+        boom = made.long_boom(count)
         yield Loss("sections", f"20 m in {count} sections", count, one_step(boom, _angles(boom), USUAL, RHO))
 
 
@@ -63,7 +62,7 @@ def _by_stiffness(scene: Scene) -> Iterator[Loss]:
         ("links, barrels, rods x 1e-6", lambda s: made.cylinder_parts(made.links(s, 1e-6), ("barrel", "rod"), 1e-6)),
         ("payload 10 x boom", lambda s: made.loaded(s, 10.0)),
         ("10 modes", lambda s: made.with_modes(s, 10)),
-        ("101 m in 7 sections", lambda s: seven_sections()),
+        ("101 m in 7 sections", lambda s: made.seven_sections()),
     ]
     for name, change in changes:
         boom = change(scene)

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("exudyn")
 
 from boom_twin import Stream
-from boom_twin.bag.session_files import samples_of
+from boom_twin.bag.session_writer import samples_of
 from boom_twin.validation.rig.faults import SPIKE_SHARE, parse, spoil
 from boom_twin.validation.rig.session import EPOCH, RigSession
 

@@ -13,9 +13,7 @@ import pytest
 from command import main
 from oracle import booms
 
-from boom_twin.validation.study.error import problem as error_problem
-from boom_twin.validation.study.error import report as error
-from boom_twin.validation.study.error import runner as error_run
+from boom_twin.validation.study import error, error_runs
 
 
 @pytest.fixture(scope="module")
@@ -55,8 +53,7 @@ def test_errors_fall_with_the_order_of_the_scheme(content, method, expected):
 
 def test_without_exudyn_the_report_goes_on(tmp_path, monkeypatch):
     reason = "boom_twin.validation.rig needs the package exudyn, which is not installed"
-    for module in (error_problem, error_run):
-        monkeypatch.setattr(module, "load_rig", lambda: (None, reason))
+    monkeypatch.setattr(error_runs, "load_rig", lambda: (None, reason))
     error.write(booms.random_boom(8), tmp_path, quick=True)
     content = json.loads((tmp_path / "error.json").read_text())
     assert content["exudyn_missing"] == reason and content["same_step"] is None
