@@ -90,7 +90,7 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
 
 
 TOLERANCE = 1e-9  # rad, increment in the last pass; the remaining error is its square
-PASSES = 60
+PASSES = np.int64(60)  # typed, see `kernels.transfer.time_step.ANEW`
 LONGEST_INCREMENT = 0.1  # rad per pass
 FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # first and smallest load step, as fractions of gravity, if the full load fails
 LEAST_CLEARANCE_STEP = 1e-3  # smallest clearance step, as a fraction of the clearances

@@ -29,7 +29,7 @@ DAMAGE = "fatigue_damage_"  # prefix of the columns with the damage of a station
 DRIFTING = ("residual_mean_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
 """Prefixes of the figures whose drift is computed."""
 LEAST_SESSIONS = 4  # least number of sessions for a drift: a line with two residual degrees of freedom
-CHANCE = 1e-3  # largest p-value of a significant drift, as in `boom_twin.report.compare.SIGNIFICANT`
+CHANCE = 1e-3  # largest p-value of a significant drift, as in `boom_twin.report.quantities.SIGNIFICANT`
 
 
 @dataclass(frozen=True, slots=True)
