@@ -15,7 +15,7 @@ from ..errors import BagError, UsageError
 from ..scene.edit import with_parameters
 from ..scene.schema import Scene
 from ..twin.twin import Twin
-from ..types import NANO, SENSORS, Array, Residuals, Stream, StrokeReading
+from ..types import SENSORS, Array, Residuals, Stream, StrokeReading
 from .fit import CalibrationProblem, Fit, InseparableUnknowns, fitted, groups_of
 from .sessions import STREAMS, MeasuredSession, Rigging, read_sessions, rest_periods
 from .unknowns import Choice, Unknown, assumed_of, unknowns_of, usual_names
@@ -44,17 +44,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class HeldOutResult:
-    """Residuals of k samples in c channels, NaN where not measured."""
+    """Residuals of c channels on what was held out."""
 
     names: tuple[str, ...]
-    times: Array  # (k,), s after the first of them
-    values: Array  # (k, c), in the unit of the sensor
-    sigmas: Array  # (k, c), expected
-
-    @property
-    def spread(self) -> Array:
-        """Root mean square of the normalised residuals of every channel, shape (c,); 1 if they are as expected."""
-        return np.array([_rms(column) for column in (self.values / self.sigmas).T])
+    spread: Array  # (c,), root mean square of the normalised residuals; 1 if they are as expected, NaN for none
 
 
 @dataclass(frozen=True)
@@ -242,18 +235,12 @@ def judged(
         for residuals in (each for report in twin.update(sample).all for each in report.residuals):
             if residuals.stamp >= start:
                 found[residuals.stream].append(residuals)
-    every = [residuals for group in found.values() for residuals in group]
-    if not every:
+    groups = [group for group in found.values() if group]
+    if not groups:
         raise BagError(f"{session.name}: the twin predicts nothing in the part held out. Are the strokes within the travel?")
-    first = min(residuals.stamp for residuals in every)
-    names = tuple(name for group in found.values() if group for name in group[0].names)
-    times = np.array([(residuals.stamp - first) * NANO for residuals in every])
-    values, sigmas = np.full((2, len(every), len(names)), np.nan)
-    for row, residuals in enumerate(every):
-        at = names.index(residuals.names[0])
-        values[row, at : at + len(residuals.names)] = residuals.values
-        sigmas[row, at : at + len(residuals.names)] = residuals.sigmas
-    return HeldOutResult(names, times, values, sigmas)
+    names = tuple(name for group in groups for name in group[0].names)
+    columns = [np.array([np.divide(each.values, each.sigmas) for each in group]).T for group in groups]
+    return HeldOutResult(names, np.array([_rms(column) for group in columns for column in group]))
 
 
 def _rms(values: Array) -> float:

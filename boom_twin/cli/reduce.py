@@ -72,7 +72,7 @@ def search(scene: Scene, most: float) -> Proposal:
         if sys.stderr.isatty():
             print(f"\r{what:70s}\r", end="", file=sys.stderr, flush=True)
 
-    proposal = propose(scene, most, scene, show)
+    proposal = propose(scene, most, show)
     show("")
     return proposal
 

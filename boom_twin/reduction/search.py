@@ -150,7 +150,7 @@ class Proposal:
     """Result of a search: the lean scene and its deviation."""
 
     scene: Scene  # the lean one
-    edits: tuple[Edit, ...]  # from the scene that the search started from to the lean one
+    edits: tuple[Edit, ...]  # from the full scene to the lean one
     deviation: Deviation  # of the lean model's tip from the full model's
     course: StrokeCourse  # on which the deviation was measured
     unknowns: tuple[int, int]  # of a step of the full and of the lean model
@@ -158,16 +158,15 @@ class Proposal:
     next: tuple[str, float] | None  # what would have to go next, and the error (m) that this would lead to
 
 
-def propose(full: Scene, most: float, start: Scene | None = None, progress: Progress = lambda _: None) -> Proposal:
+def propose(full: Scene, most: float, progress: Progress = lambda _: None) -> Proposal:
     """Look for the leanest model whose tip stays within `most` (m) of that of the scene `full`.
 
-    The search begins with `start`, a model of the same boom, by default `full` itself; `progress` is told in words what is
-    done. UsageError if `most` is not positive, or `start` is another boom or further off already. SolverError if the full
-    model itself has no equilibrium or fails in the move.
+    `progress` is told in words what is done. UsageError if `most` is not positive, SolverError if the full model itself has no
+    equilibrium or fails in the move.
     """
     if not (math.isfinite(most) and most > 0.0):
         raise UsageError(f"need = {most!r} m: must be positive. Give for example 0.001.")
-    search = _Search(full, start or full, most, progress)
+    search = _Search(full, most, progress)
     while search.round():
         pass
     lean = search.model()
@@ -179,13 +178,10 @@ def propose(full: Scene, most: float, start: Scene | None = None, progress: Prog
 
 
 class _Search:
-    """The present model, as edits of the one that the search started from, and all errors measured so far."""
+    """The present model, as edits of the full one, and all errors measured so far."""
 
-    def __init__(self, full: Scene, start: Scene, most: float, progress: Progress) -> None:
-        one, other = ([section.length for section in scene.sections] for scene in (full, start))
-        if one != other:
-            raise UsageError(f"lengths of sections = {other}: the full scene has {one}. Give two scenes of the same boom.")
-        self.start, self.most, self.progress = start, most, progress
+    def __init__(self, full: Scene, most: float, progress: Progress) -> None:
+        self.scene, self.most, self.progress = full, most, progress
         self.course = course_of(full)
         self.edits: tuple[Edit, ...] = ()
         self.full: Response = answer(full, self.course)
@@ -194,26 +190,22 @@ class _Search:
         self.known: dict[tuple[Edit, ...], Deviation] = {}
         self.sizes: dict[tuple[Edit, ...], float] = {}
         self.next: tuple[str, float] | None = None
-        first = self.measured(()).worst
-        if first > most:
-            off = f"the scene to start from is {first:.3g} m off already"
-            raise UsageError(f"need = {most:g} m: {off}. Start from a fuller one.")
 
     def model(self) -> Scene:
         """The present model."""
-        return edited(self.start, self.edits)
+        return edited(self.scene, self.edits)
 
     def size(self, edits: tuple[Edit, ...]) -> float:
-        """Return the size of the first model after `edits`, see `reduction.deviation`."""
+        """Return the size of the full scene after `edits`, see `reduction.deviation`."""
         if edits not in self.sizes:
-            self.sizes[edits] = size(edited(self.start, edits))
+            self.sizes[edits] = size(edited(self.scene, edits))
         return self.sizes[edits]
 
     def measured(self, edits: tuple[Edit, ...]) -> Deviation:
-        """Return the deviation of the first model after `edits` from the full model."""
+        """Return the deviation of the scene after `edits` from the full one."""
         if edits not in self.known:
             self.progress(f"{len(self.known)} models measured, {len(self.edits)} edits kept")
-            found = answer(edited(self.start, edits), self.course)
+            found = answer(edited(self.scene, edits), self.course)
             self.known[edits] = deviation(found, self.full, self.course)
         return self.known[edits]
 
@@ -239,7 +231,7 @@ class _Search:
 
     def _parts(self) -> Iterator[tuple[VariantKind, Sequence[int]]]:
         """Every kind of part, everywhere and in every group of sections."""
-        everywhere = range(len(self.start.sections))
+        everywhere = range(len(self.scene.sections))
         groups = [group.tolist() for group in np.array_split(everywhere, min(GROUPS, len(everywhere)))]
         for kind in (FEWER_MODES, *KINDS):
             for where in [everywhere, *groups] if len(groups) > 1 else [everywhere]:
