@@ -21,7 +21,7 @@ from ..kernels.integrators import GENERALISED_ALPHA
 from ..kernels.result_row import Results
 from ..kernels.tables import State, Work
 from ..kernels.transfer.time_step import run
-from ..system.summary_display import numbers
+from ..system.result_text import numbers
 from ..types import Array, StrokeReading
 
 

@@ -24,7 +24,7 @@ from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.vibration import TIP_FORCE, harmonic_response
 from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..system.summary_display import SummaryDisplay
+from ..system.result_text import SummaryDisplay
 from ..types import Array, ComplexArray
 from .bending_stress import Station, moments_by_unknowns, stations
 from .equilibrium import rest_at, strokes_and_angles

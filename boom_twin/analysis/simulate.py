@@ -18,7 +18,7 @@ from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..system.summary_display import SummaryDisplay, data_frame, numbers
+from ..system.result_text import SummaryDisplay, data_frame, numbers
 from ..types import Array
 from .doubts import (
     EstimatedError,
@@ -32,7 +32,7 @@ from .doubts import (
 )
 from .drive import NO_FORCE, DriveCourse, Run, drives_of, force_at
 from .equilibrium import rest_at, travel_words
-from .steady_state import LARGEST_FORCE
+from .steady_state import check_force_rows
 
 RHO = 0.8
 CLOSEST = 1e-6  # s, between rows: rounding of positions over the square of a shorter step is more than 0.01 m/s^2
@@ -51,11 +51,6 @@ class Simulation(SummaryDisplay):
         Drives, and lengths of the cylinders pin to pin less `closed_length`, m; rad; N (tension positive).
     tip, tip_velocity, tip_acceleration : ndarray, shape (m, 3)
         x, y, orientation of the last head, in m and rad, and their rates.
-    passes : float
-        Newton passes per step, mean.
-    step_error : float
-        Sum of the errors of all steps in the position of the tip, m: about what stepping may have added to it. One step's is
-        |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991, for Newmark's family).
     step_errors, row_errors : tuple of EstimatedError
         Estimated errors of tip, acceleration and forces, from steps and from what lies between the rows of the drive; empty
         where they were not asked for.
@@ -81,8 +76,6 @@ class Simulation(SummaryDisplay):
     tip: Array
     tip_velocity: Array
     tip_acceleration: Array
-    passes: float
-    step_error: float
     step_errors: tuple[EstimatedError, ...]
     row_errors: tuple[EstimatedError, ...]
     doubts: tuple[str, ...]
@@ -121,7 +114,7 @@ class Simulation(SummaryDisplay):
         return data_frame(self.columns())
 
     def summary_rows(self) -> dict[str, str]:
-        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        """See `boom_twin.system.result_text.SummaryDisplay`."""
         return {
             "rows": f"{len(self.times)}, {self.times[-1] - self.times[0]:.4g} s",
             "tip at the end": f"{numbers(self.tip[-1, :2])} m",
@@ -208,7 +201,6 @@ def simulate(
         strokes = drives_of(compile_scene(scene), times, own.rows.lengths, own.rows.cylinder_forces)
     return Simulation(
         times, strokes, own.rows.lengths, own.rows.joints, own.rows.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
-        own.passes, abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * own.jolt,
         by_steps, by_rows, doubts, plan.pins, own.rows.pins, own.lost, own.end,
     )  # fmt: skip
 
@@ -246,13 +238,7 @@ def _checked_force(times: Array, force: Array) -> Array:
         force = np.column_stack([times, force])
     if force.ndim != 2 or force.shape[1] != 3 or not len(force):
         raise UsageError(f"force = array of shape {force.shape}: give x and y at every row of times, or rows of t_s, x, y.")
-    for row in np.flatnonzero(~(np.isfinite(force[:, 0]) & (np.abs(force[:, 1:]) <= LARGEST_FORCE).all(axis=1))):
-        at, x, y = force[row]
-        told = f"row {row + 1} of the force: t_s = {at:g}, tip_fx_N = {x:g}, tip_fy_N = {y:g}"
-        raise UsageError(f"{told}: a time must be finite, a force at most {LARGEST_FORCE:g} N. Put it right.")
-    for row in np.flatnonzero(np.diff(force[:, 0]) <= 0.0):
-        told = f"t_s = {force[row + 1, 0]:.9g} s in row {row + 2} of the force"
-        raise UsageError(f"{told}: not after row {row + 1}. Sort the rows.")
+    check_force_rows(force, "force", ("t_s", "tip_fx_N", "tip_fy_N"))
     return force
 
 

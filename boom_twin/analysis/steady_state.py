@@ -11,14 +11,13 @@ itself: with a first mode at 1.06 Hz already at 0.35 Hz, by the third harmonic.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from ..errors import UsageError
-from ..scene.kinematics import posture_angles, strokes_of_angles
+from ..scene.kinematics import strokes_of_angles
 from ..scene.pump_pulses import CHANGE_OVER, pump_pulses, upward
 from ..scene.schema import Scene
 from ..types import Array, ComplexArray
@@ -63,6 +62,17 @@ def pump_load(scene: Scene, frequency: float, height: float, change_over: float 
     return PeriodicLoad(1.0 / frequency, pulses[:, None] * upward(scene.base.inclination))
 
 
+def check_force_rows(rows: Array, what: str, names: Sequence[str]) -> None:
+    """Raise UsageError unless times increase and forces are plausible; `rows` (m, 3) are time (s), x and y (N)."""
+    for row in np.flatnonzero(~(np.isfinite(rows[:, 0]) & (np.abs(rows[:, 1:]) <= LARGEST_FORCE).all(axis=1))):
+        told = ", ".join(f"{name} = {value:g}" for name, value in zip(names, rows[row], strict=True))
+        bound = f"a time must be finite, a force at most {LARGEST_FORCE:g} N"
+        raise UsageError(f"row {row + 1} of the {what}: {told}: {bound}. Put it right.")
+    for row in np.flatnonzero(np.diff(rows[:, 0]) <= 0.0):
+        told = f"t_s = {rows[row + 1, 0]:.9g} s in row {row + 2} of the {what}"
+        raise UsageError(f"{told}: not after row {row + 1}. Sort the rows.")
+
+
 def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
     """Return a load that goes straight from row to row.
 
@@ -71,16 +81,7 @@ def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
     """
     if len(times) < 3:
         raise UsageError("load: give at least three rows of finite numbers t_s,fx_N,fy_N, one period of the force.")
-    usable = np.isfinite(times) & (np.abs(forces) <= LARGEST_FORCE).all(axis=1)
-    if not usable.all():
-        row = int(np.flatnonzero(~usable)[0])
-        raise UsageError(
-            f"row {row + 1} of the load: t_s = {times[row]:g} s, fx_N = {forces[row, 0]:g}, fy_N = {forces[row, 1]:g}: times "
-            f"must be finite, forces at most {LARGEST_FORCE:g} N. Put it right."
-        )
-    if np.any(np.diff(times) <= 0.0):
-        row = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
-        raise UsageError(f"t_s = {times[row + 1]:g} s in row {row + 2} of the load: not after row {row + 1}. Sort the rows.")
+    check_force_rows(np.column_stack([times, forces]), "load", ("t_s", "fx_N", "fy_N"))
     if not np.allclose(forces[0], forces[-1], rtol=1e-9, atol=1e-9 * float(np.abs(forces).max())):
         raise UsageError(
             f"load: begins with ({forces[0, 0]:g}, {forces[0, 1]:g}) N and ends with ({forces[-1, 0]:g}, {forces[-1, 1]:g}) N. "
@@ -223,23 +224,6 @@ def resonance_map(
             found = steady_state_of(boom, load)
             swing[i, j], harmonics[i, j] = found.swing, 1 + int(np.argmax(found.harmonics))
     return ResonanceMap(tuple(postures), np.asarray(rates, float), swing, harmonics)
-
-
-def named_postures(scene: Scene) -> dict[str, Array]:
-    """Joint angles (rad) of all postures of the scene."""
-    return {name: posture_angles(scene, name) for name in scene.postures}
-
-
-def postures_along(scene: Scene, names: list[str], steps: int) -> dict[str, Array]:
-    """Joint angles (rad) along the way from posture to posture, in `steps` even steps of all joints from each to the next."""
-    corners = [posture_angles(scene, name) for name in names]
-    found = {names[0]: corners[0]}
-    for k, (before, after) in enumerate(pairwise(corners)):
-        for step in range(1, steps):
-            share = step / steps
-            found[f"{names[k]} to {names[k + 1]} {100.0 * share:.0f} %"] = before + share * (after - before)
-        found[names[k + 1]] = after
-    return found
 
 
 def _strokes(scene: Scene, name: str, angles: Array) -> Array:

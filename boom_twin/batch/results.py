@@ -19,7 +19,7 @@ from ..plots.results import Trend, trends_picture
 from ..report.fatigue import LIVES, hours_as_text, hours_to_end, yearly_as_text
 from ..report.html import render
 from ..system.atomic_files import write_atomic
-from ..system.json_text import json_text
+from ..system.result_text import json_text
 from ..types import SECOND, sensor_kind
 from .folder import SESSIONS
 from .session_task import OK, Row
@@ -29,7 +29,7 @@ DAMAGE = "fatigue_damage_"  # prefix of the columns with the damage of a station
 DRIFTING = ("residual_mean_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
 """Prefixes of the figures whose drift is computed."""
 LEAST_SESSIONS = 4  # least number of sessions for a drift: a line with two residual degrees of freedom
-CHANCE = 1e-3  # largest p-value of a significant drift, as in `boom_twin.report.compare.SIGNIFICANT`
+CHANCE = 1e-3  # largest p-value of a significant drift, as in `boom_twin.report.quantities.SIGNIFICANT`
 
 
 @dataclass(frozen=True, slots=True)

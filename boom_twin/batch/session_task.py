@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..errors import BagError, BoomTwinError, UsageError
-from ..system.child_process import python_command
+from ..system.processes import python_command
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -23,7 +23,7 @@ from ..scene.edit import with_parameters
 from ..scene.kinematics import gravity_in_base
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
-from ..system.cores import usable_cores
+from ..system.processes import usable_cores
 from ..types import SENSORS, Array, channels_of
 from .rest_filter import filter_rest
 from .sessions import STREAMS, RestPeriod, Rigging, channel_names

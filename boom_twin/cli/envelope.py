@@ -8,7 +8,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..system.json_text import json_text
+from ..system.result_text import json_text
 from .arguments import add_file, add_json, add_scene, files_of
 from .output import columns, open_scene, print_result
 

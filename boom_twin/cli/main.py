@@ -22,7 +22,7 @@ from typing import NoReturn, Protocol, TextIO, cast
 
 from .. import __version__
 from ..errors import BoomTwinError
-from ..system.cores import use_one_blas_thread
+from ..system.processes import use_one_blas_thread
 from ..system.terminal_text import PrintableStream, open_closed_streams
 from .output import QuietStream
 
@@ -88,7 +88,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "calibrate": ("calibrate bags/today bags/tomorrow --out calibrated.yaml",),
     "modal": ("modal bags/night --out out/modal",),
     "batch": ("batch 'bags/*' --out out/batch",),
-    "compare": ("compare bags/before bags/after --out out/compare",),
+    "compare": ("compare bags/before bags/after",),
     "warm": ("warm", "warm --remove"),
     "study": ("study error --out out/study/error",),
     "rig": ("rig --out out/soft --fault cylinder_2.k:softer:0.3", "rig --list-faults"),

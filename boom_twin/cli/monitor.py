@@ -94,8 +94,8 @@ def _serve(args: Namespace, feed: Feed, actions: Any) -> None:
     import asyncio
 
     from ..monitor.access_control import AccessControl, token_of
+    from ..monitor.fleet import Webhook
     from ..monitor.server import Server
-    from ..monitor.webhook import Webhook
 
     access = AccessControl(args.host, "" if args.token_file is None else token_of(args.token_file))
     webhook = None if args.webhook is None else Webhook(args.webhook)

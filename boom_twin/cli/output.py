@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from ..errors import Fault
-from ..system.json_text import json_text
+from ..system.result_text import json_text
 
 if TYPE_CHECKING:
     from ..bag.reader import Session

@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..scene import Scene
 from ..system.atomic_files import check_target, write_atomic
 from ..system.csv_table import CsvTable, columns_text, read_csv
-from ..system.summary_display import numbers
+from ..system.result_text import numbers
 from ..types import Array
 from .arguments import add_json, add_scene, files_of, not_negative
 from .output import open_scene, print_result, warn

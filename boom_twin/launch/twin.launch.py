@@ -21,7 +21,7 @@ from boom_twin.errors import BoomTwinError
 from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.urdf import RVIZ, urdf
 from boom_twin.scene import Scene, load_scene
-from boom_twin.system.child_process import python_command
+from boom_twin.system.processes import python_command
 from boom_twin.system.result_folder import check_lasting
 
 FLAG = ("true", "false")

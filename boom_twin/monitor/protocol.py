@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..system.json_text import json_text
+from ..system.result_text import json_text
 from ..types import SENSORS
 from .data.status import HEALTH, ListedAlarm, Severity, StatusLamp, overall, worst
 from .data.store import DroppedMessages, Store

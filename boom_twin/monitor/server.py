@@ -17,9 +17,8 @@ from . import PORT
 from .access_control import POLICY, AccessControl, Connection, Connections, in_address
 from .data.analyst import Analyst
 from .data.feed import Feed
-from .metrics import Metrics
+from .fleet import AlarmWatch, Metrics, Webhook
 from .viewer import Viewer, ViewerActions
-from .webhook import AlarmWatch, Webhook
 
 PAGE = Path(__file__).parent / "page"
 MAX_VIEWERS = 16

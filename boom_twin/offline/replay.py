@@ -25,7 +25,7 @@ from ..messages.sample_decoder import ODDITIES
 from ..scene.load import SceneSource
 from ..system.atomic_files import write_atomic
 from ..system.result_folder import REPLAY, result_folder
-from ..system.summary_display import SummaryDisplay, data_frame
+from ..system.result_text import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, CONSEQUENCES, EVENTS, ResidualBlock, SampleBlock
 from ..twin.twin import Twin, drive
 from ..types import SENSORS, Array, Change, Stream, StrokeReading
@@ -84,7 +84,7 @@ class Replay(SummaryDisplay):
         return data_frame(self.columns())
 
     def summary_rows(self) -> dict[str, str]:
-        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        """See `boom_twin.system.result_text.SummaryDisplay`."""
         told = self.summary
         return {
             "session": str(self.session.path),

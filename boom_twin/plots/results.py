@@ -1,4 +1,4 @@
-"""Pictures of results about sessions: alarms, frequencies, loads, a comparison, a calibration, trends, identified modes."""
+"""Pictures of results about sessions: alarms, frequencies, loads, trends, identified modes."""
 
 from __future__ import annotations
 
@@ -82,32 +82,6 @@ def moment_picture(path: Path, session: str, history: History, rows: list[tuple[
         legend_above(panels[0], 2)
         panels[-1].set_xlim(extent(history.stamps_s))
         panels[-1].set_xlabel(TIME)
-
-
-SHOWN = 30.0  # standard deviations at which a bar is cut off, with its number beside it
-
-
-def compare_picture(path: Path, title: str, names: list[str], apart: list[float], sure: float) -> None:
-    """Write the comparison of two sessions: a bar for every figure.
-
-    It is as long as B minus A over the standard deviation of that, which is no chance from `sure` on.
-    """
-    with picture(path, title, "", (16.0, 2.0 + 0.42 * max(len(names), 1))) as figure:
-        axes = figure.add_subplot()
-        places = np.arange(len(names))
-        axes.axvspan(-sure, sure, color=GREEN, alpha=0.12, linewidth=0, label="may be chance")
-        colours = [ORANGE if abs(value) > sure else GREY for value in apart]
-        axes.barh(places, np.clip(apart, -SHOWN, SHOWN), height=0.7, color=colours)
-        for place, value in zip(places, apart, strict=True):
-            if abs(value) > SHOWN:
-                side = "left" if value > 0.0 else "right"
-                axes.annotate(f"{value:+.0f}", (np.sign(value) * SHOWN, place), va="center", ha=side)
-        axes.set_yticks(places, names)
-        axes.set_ylim(len(names) - 0.4, -0.6)
-        axes.set_xlim(-SHOWN - 4.0, SHOWN + 4.0)
-        axes.grid(axis="y", visible=False)
-        axes.set_xlabel("B minus A, standard deviations")
-        legend_above(axes)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..system.child_process import beside
+from ..system.processes import beside
 from ..types import Array
 from .boom import draw_base
 from .history import History, Truth

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from types import FrameType
 
 from ..errors import UsageError
-from ..system.child_process import python_command
+from ..system.processes import python_command
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Signals that end a process. A closed terminal sends SIGHUP; ``nohup`` ignores it."""

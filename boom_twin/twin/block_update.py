@@ -155,7 +155,7 @@ class BlockUpdate:
         if run is None or self._judge is None:
             return None
         self._tell_health(run.newest // SLOT * SLOT)
-        health = self._judge.judge(run.newest, self._boom.tip_load, lambda: self._boom.tip_sigmas)
+        health = self._judge.judge(run.newest, self._boom.tip_loads, lambda: self._boom.tip_sigmas)
         self._boom.leave_out(self._judge.suspected, self._judge.failing_strokes)
         return health
 
@@ -188,14 +188,13 @@ class BlockUpdate:
                 values = (each[rows, :width] for each in (found.raw, found.values, found.sigmas))
                 self._judge.measured(STREAMS[code], MeasuredRows(found.residual_stamps[rows], *values))
 
-    def _block(self, stamps: Integers, predicted: slice, compared: slice, outlines: dict[int, Outline]) -> ReportBlock:
-        """Return the reports of samples with these stamps (ns) from rows of the results."""
+    def _predictions(self, own: slice, outlines: dict[int, Outline]) -> PredictionBlock:
         found, at = self._found, self._boom.places
-        rows, row_stamps = found.rows[predicted].copy(), found.stamps[predicted].copy()
+        rows = found.rows[own].copy()
         tip = rows[:, at.tip].reshape(-1, 3, 3)
-        predictions = PredictionBlock(
-            at=found.at[predicted].copy(),
-            stamps=row_stamps,
+        return PredictionBlock(
+            at=found.at[own].copy(),
+            stamps=found.stamps[own].copy(),
             tip_position=tip[:, 0, :2],
             tip_displacement=tip[:, 0, :2] - rows[:, at.rigid_tip],
             tip_velocity=tip[:, 1, :2],
@@ -207,14 +206,17 @@ class BlockUpdate:
             strokes=rows[:, at.strokes],
             cylinder_forces=rows[:, at.cylinder_forces],
             clearances=rows[:, at.pins].reshape(len(rows), self._pins, PIN),
-            moments=found.moments[predicted].copy(),
+            moments=found.moments[own].copy(),
             outlines=outlines,
         )
+
+    def _block(self, stamps: Integers, predicted: slice, compared: slice, outlines: dict[int, Outline]) -> ReportBlock:
+        """Return the reports of samples with these stamps (ns) from rows of the results."""
+        found, predictions = self._found, self._predictions(predicted, outlines)
         columns = found.residual_at, found.residual_streams, found.residual_stamps, found.values, found.sigmas
         residuals = ResidualBlock._make(each[compared].copy() for each in columns)
-        return ReportBlock(
-            stamps, predictions, EstimateBlock(row_stamps, found.estimates[predicted].copy()), residuals, self._health, {}
-        )
+        estimates = EstimateBlock(predictions.stamps, found.estimates[predicted].copy())
+        return ReportBlock(stamps, predictions, estimates, residuals, self._health, {})
 
     def _outlines(self) -> dict[int, Outline]:
         drawn = self._drawn
@@ -244,8 +246,8 @@ class BlockUpdate:
         residuals = tuple(self._residuals_in(row) for row in range(self._begin[1], known))
         if predicted == self._begin[0]:
             return Report(stamp, True, residuals=residuals)
-        at, outline, events = predicted - 1, self._outlines().get(0), self._events.get(0, ())
-        prediction = self._boom.prediction_in(found.rows[at].copy(), stamp, outline, found.moments[at].copy())
+        at, events = predicted - 1, self._events.get(0, ())
+        prediction = self._predictions(slice(at, predicted), self._outlines()).one(0)
         health = self.judge() if judged else None
         estimate = estimate_of(stamp, found.estimates[at].copy())
         return Report(stamp, True, prediction, residuals, events, health=health, estimate=estimate)

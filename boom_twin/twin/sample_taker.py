@@ -221,7 +221,7 @@ class SampleTaker:
             events = ["restart" if span > 0 else "jump back"]
             self._restart()
         elif events and why is TimeStep.EITHER:
-            self._boom.add_phase(self._boom.prediction(run.newest))
+            self._boom.add_phase()
         reports, asked = [], self._judged
         for sample in held:
             complete, self._judged = self._is_complete(sample), asked or sample is not held[-1]

@@ -261,11 +261,8 @@ class Twin(SampleTaker):
         row, size, drive, self._judged = 0, len(block.stamps), CODES[self._drive], True
         while row < size:
             is_sure = self._run is not None and self._edge.is_sure and not self.requests.due
-            end, stamp, is_drive = (
-                row + (self._room.samples if is_sure else 1),
-                int(block.stamps[row]),
-                block.streams[row] == drive,
-            )
+            end = row + (self._room.samples if is_sure else 1)
+            stamp, is_drive = int(block.stamps[row]), block.streams[row] == drive
             if is_drive:
                 self._edge.look(stamp)
             if self._fault_twins is not None:  # they take a second before its verdict may be asked for

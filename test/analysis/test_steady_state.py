@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from default_boom import strokes_of_posture
+from default_boom import posture_angles, strokes_of_posture
 from oracle import booms
 
 from boom_twin import UsageError, frequency_response, load_scene, simulate, statics
@@ -12,7 +12,6 @@ from boom_twin.analysis.steady_state import (
     INSTANTS,
     PeriodicLoad,
     load_of_rows,
-    named_postures,
     pump_load,
     resonance_map,
     steady_state,
@@ -113,7 +112,9 @@ def test_pumps_refused(given, told):
 
 def test_map_names_the_rates_whose_harmonics_meet_the_first_mode():
     rates = np.linspace(0.28, 0.46, 37)
-    found = resonance_map(SCENE, named_postures(SCENE), rates, lambda rate: pump_load(SCENE, rate, 130.0))
+    found = resonance_map(
+        SCENE, {name: posture_angles(SCENE, name) for name in SCENE.postures}, rates, lambda rate: pump_load(SCENE, rate, 130.0)
+    )
     assert found.postures == tuple(SCENE.postures) and found.swing.shape == (len(SCENE.postures), 37)
     for name in SCENE.postures:
         first = statics(SCENE, posture=name).frequencies[0]

@@ -28,7 +28,7 @@ from command import main  # noqa: E402
 from boom_twin import load_scene, replay  # noqa: E402
 from boom_twin.batch.session_task import SessionTask, row_of  # noqa: E402
 from boom_twin.calibration import calibrate  # noqa: E402
-from boom_twin.system.child_process import python_command  # noqa: E402
+from boom_twin.system.processes import python_command  # noqa: E402
 
 COUNT = 5
 PATIENCE = 300.0

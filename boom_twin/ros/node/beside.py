@@ -11,7 +11,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from ...messages.topic_table import Topics
-from ...system.child_process import end_process, python_command
+from ...system.processes import end_process, python_command
 from ..startup import PREPARATION
 
 Result = TypeVar("Result")

@@ -13,7 +13,7 @@ from threading import Event
 from typing import TYPE_CHECKING
 
 from ...errors import BoomTwinError
-from ...system.cores import use_one_blas_thread
+from ...system.processes import use_one_blas_thread
 from ...system.terminal_text import open_closed_streams
 from ..startup import end_with_preparation, on_stop_signal, require_rclpy
 

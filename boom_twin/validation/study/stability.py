@@ -15,7 +15,6 @@ import numpy as np
 from ...analysis.equilibrium import rest_at
 from ...analysis.methods import Method, MethodRun, integrate_with
 from ...errors import SolverError
-from ...plots.study import MatrixRow, matrix_picture
 from ...scene.kinematics import joint_angles_of_strokes, section_angles
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
@@ -122,7 +121,7 @@ MEANINGS = {
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
-    """Run the study on motions from `posture`; write stability.json, stability.md and stability.png; return their paths.
+    """Run the study on motions from `posture`; write stability.json and stability.md; return their paths.
 
     `quick`: a subset of the cases.
     """
@@ -139,11 +138,9 @@ def _title(case: Case) -> str:
 
 def write_files(out: Path, rows: list[CaseResult], move: str) -> list[Path]:
     """Write all files; `move` tells of the scene's motion."""
-    paths = [out / f"stability.{kind}" for kind in ("json", "md", "png")]
+    paths = [out / f"stability.{kind}" for kind in ("json", "md")]
     write_json(paths[0], _content(rows))
     write_atomic(paths[1], text(rows, move))
-    lines = [MatrixRow(row.case.group, row.case.name, [cell.verdict.mark for cell in row.cells.values()]) for row in rows]
-    matrix_picture(paths[2], "Where each method holds", list(rows[0].cells), lines)
     return paths
 
 
@@ -158,7 +155,6 @@ def text(rows: Sequence[CaseResult], move: str) -> str:
         "Every method integrates every case. The reference is the default method at an eighth of the step (Newton tolerance "
         f"1e-10 rad), or the equilibrium. The move: {move}. Cases make all or part of it, in 1 s unless stated otherwise. "
         "Accelerations and forces within 50 ms after a speed jump are impulses and are ignored.",
-        "![Where each method holds](stability.png)",
         "## Verdicts by method", "".join(f"- {mark}: {meaning}.\n" for mark, meaning in MEANINGS.items()), _counts(rows),
         "## The default",
         "All cases hold except:", _default(rows),

@@ -1,12 +1,13 @@
-"""Short texts of results, for a terminal (`repr`) and for notebooks."""
+"""Results as text: short summaries for a terminal (`repr`) and notebooks, and JSON without numbers that are not finite."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, is_dataclass
 from html import escape
+from math import isfinite
 from typing import Any
-
-import numpy as np
 
 from ..errors import UsageError
 
@@ -33,7 +34,9 @@ class SummaryDisplay:
 
 def numbers(values: Any, factor: float = 1.0, digits: int = 4) -> str:
     """Return numbers as text with `digits` significant digits, separated by commas."""
-    return ", ".join(f"{factor * value:.{digits}g}" for value in np.atleast_1d(values).tolist())
+    values = values.tolist() if hasattr(values, "tolist") else values
+    values = values if isinstance(values, Iterable) else [values]
+    return ", ".join(f"{factor * value:.{digits}g}" for value in values)
 
 
 def data_frame(columns: Mapping[str, Any]) -> Any:
@@ -44,3 +47,22 @@ def data_frame(columns: Mapping[str, Any]) -> Any:
         remedy = 'Run `pip install "boom_twin[notebook]"`, or take columns().'
         raise UsageError(f"to_frame needs pandas ({error}). {remedy}") from None
     return DataFrame(dict(columns))
+
+
+def json_text(value: Any, indent: int | None = None, separators: tuple[str, str] | None = None) -> str:
+    """Return the JSON text of mappings, lists, arrays, dataclass instances and plain values."""
+    return json.dumps(_plain(value), indent=indent, separators=separators, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value

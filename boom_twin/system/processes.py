@@ -1,18 +1,19 @@
-"""Child processes: the command line of one that runs a module of this package only, and a copy of this process."""
+"""Processes: command line of a child that runs a module of this package only, a copy of this process, cores, BLAS threads."""
 
 from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from .cores import usable_cores
+if TYPE_CHECKING:
+    from subprocess import Popen
+
 
 ROOT = Path(__file__).absolute().parents[2]  # folder or zip archive from which this process imported ``boom_twin``
 
@@ -34,12 +35,14 @@ def python_command(module: str, *arguments: str) -> list[str]:
     return [sys.executable, "-P", "-c", _START, str(ROOT), module, *arguments]
 
 
-def end_process(process: subprocess.Popen[Any], timeout: float, by: signal.Signals = signal.SIGTERM) -> None:
+def end_process(process: Popen[Any], timeout: float, by: signal.Signals = signal.SIGTERM) -> None:
     """End a child process by a signal and wait for its end. After `timeout` (s) it is killed."""
+    from subprocess import TimeoutExpired
+
     process.send_signal(by)
     try:
         process.wait(timeout)
-    except subprocess.TimeoutExpired:
+    except TimeoutExpired:
         process.kill()
         process.wait()
 
@@ -68,3 +71,18 @@ def beside(work: Callable[[], None]) -> Iterator[None]:
         _, status = os.waitpid(pid, 0)
     if status:
         work()
+
+
+def usable_cores() -> int:
+    """Return the number of cores that this process may use; if the system does not give it, the number of the machine."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def use_one_blas_thread() -> None:
+    """Let OpenBLAS work on one thread, unless the environment says otherwise; before numpy is imported.
+
+    Threads slow small matrices down ten times and more, and their number changes the last bits of products of larger ones: a
+    live node and a replay of its session must not differ by the computers they ran on. What runs on several cores here does so
+    as processes.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
