@@ -6,13 +6,15 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 from ..errors import BagError
 from ..messages.sample_decoder import MOST_NAMES
 from ..messages.topic_table import Qos, Topic, Topics
 from ..types import SENSORS, Stream
 from .inspect import BagInfo, Tally
-from .reader import Session, check_topic, read, readable
+from .metadata import profiles
+from .reader import Session, TopicInfo, check_topic, read, readable
 from .session_file import CDR
 from .session_model import mapping_of
 
@@ -108,7 +110,7 @@ class Publishable:
 
 
 def publishable(session: Session, names: Sequence[str] | None = None) -> list[Publishable]:
-    """Return the topics with these names; without names, strokes and all inputs with messages. The mapping gives the QoS.
+    """Return the topics with these names; without names, strokes and all inputs with messages.
 
     Raise BagError if a topic is missing, is empty, or is an input of another type.
     """
@@ -122,8 +124,28 @@ def publishable(session: Session, names: Sequence[str] | None = None) -> list[Pu
     else:
         found = [check_topic(session, name, getattr(session.find(name), "type", "")) for name in names]
         chosen = {topic.name: topic for topic in found}
-    known = {topic.absolute: topic.qos for topic in topics.inputs.values()}
-    return [Publishable(name, topic.type, known.get(topic.name, _USUAL)) for name, topic in chosen.items()]
+    return [Publishable(name, topic.type, _qos(session, topic, topics)) for name, topic in chosen.items()]
+
+
+def _qos(session: Session, topic: TopicInfo, topics: Topics) -> Qos:
+    """Return the strongest QoS offered in the metadata, or else in the channels; by default the mapping's."""
+    offered = [qos for value in _values(session, topic.name) for qos in profiles(value)]
+    if not offered:
+        known = (each for each in topics.inputs.values() if each.absolute == topic.name)
+        return next((each.qos for each in known), _USUAL)
+    return Qos(
+        reliability="reliable" if any(qos.reliability == "reliable" for qos in offered) else "best_effort",
+        durability="transient_local" if any(qos.durability == "transient_local" for qos in offered) else "volatile",
+        depth=max(qos.depth for qos in offered),
+    )
+
+
+def _values(session: Session, name: str) -> list[Any]:
+    if session.metadata is not None:
+        entries = (entry.topic_metadata for entry in session.metadata.topics_with_message_count)
+        return [entry.offered_qos_profiles for entry in entries if entry.name == name]
+    channels = (channel for file in session.files for channel in file.channels.values() if channel.topic == name)
+    return [channel.metadata.get("offered_qos_profiles", "") for channel in channels]
 
 
 NAMING_TIME = 5_000_000_000  # log time (ns) from the first message of strokes or angles, in which all names are read

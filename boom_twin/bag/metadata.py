@@ -158,14 +158,38 @@ def offered_qos(qos: Qos) -> list[dict[str, Any]]:
     ]
 
 
-def kept_qos(value: Any) -> list[dict[Any, Any]]:
-    """Return the offered profiles of ``metadata.yaml`` or of a channel, none if not in the format of version 9."""
+DEEPEST = 10_000  # limit for the depth of a QoS profile that is read
+
+_RELIABILITY = {1: "reliable", 2: "best_effort", "reliable": "reliable", "best_effort": "best_effort"}
+_DURABILITY = {1: "transient_local", 2: "volatile", "transient_local": "transient_local", "volatile": "volatile"}
+_LONGEST = 100_000  # characters of YAML in one entry
+
+
+def profiles(value: Any) -> list[Qos]:
+    """Return the QoS profiles of one topic as in ``topics.yaml``. A profile that cannot be read is left out.
+
+    `value` is ``offered_qos_profiles`` of ``metadata.yaml`` or of a channel: a list, or YAML of one.
+    """
+    if isinstance(value, str):
+        try:
+            value = plain(value) if len(value) <= _LONGEST else []
+        except ValueError:
+            return []
+    found = [_profile(entry) for entry in (value if isinstance(value, list) else []) if isinstance(entry, dict)]
+    return [qos for qos in found if qos is not None]
+
+
+def _profile(entry: dict[Any, Any]) -> Qos | None:
     try:
-        found = plain(value) if isinstance(value, str) else value
-    except ValueError:
-        return []
-    entries = [entry for entry in found if isinstance(entry, dict)] if isinstance(found, list) else []
-    return [entry for entry in entries if isinstance(entry.get("reliability"), str)]
+        return Qos.model_validate(
+            {
+                "reliability": _RELIABILITY.get(entry.get("reliability"), "reliable"),
+                "durability": _DURABILITY.get(entry.get("durability"), "volatile"),
+                "depth": min(max(int(entry.get("depth") or 1), 1), DEEPEST),
+            }
+        )
+    except (ValidationError, TypeError, ValueError):
+        return None
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from ..system.received_files import holds_file, open_received
 from ..system.result_folder import RECOVER, result_folder
 from .mcap_file import NOTES, PROFILE
 from .mcap_records import LARGEST_SUMMARY, MESSAGE_HEAD, checksum_of, parts, record_of, summary_start
-from .metadata import BagMetadata, Recorded, kept_qos
+from .metadata import BagMetadata, Recorded, offered_qos, profiles
 from .reader import RECOVERED, SUMMARISE, scan, sources
 from .scanner import DamagedBytes, SoundRecords, scan_damaged
 from .session_file import as_bag_error, by_topic
@@ -51,7 +51,7 @@ class FileDefinitions:
             type=schema.name,
             definition=schema.data,
             details=found.metadata,
-            qos=kept_qos(offered),
+            qos=[profile for qos in profiles(offered) for profile in offered_qos(qos)],
             type_hash=known.type_description_hash if known else found.metadata.get("topic_type_hash", ""),
             encoding=found.message_encoding,
             definition_encoding=schema.encoding,
