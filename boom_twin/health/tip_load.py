@@ -43,7 +43,8 @@ class TipLoadMonitor:
         """Take forces (2, 2), predicted and estimated, in N, with variances at `stamp` (ns); return what began or ended."""
         size = max(float((loads[1] @ loads[1]) ** 0.5), 1e-300)
         direction = loads[1] / size
-        predicted, doubt, sigma = float(direction @ loads[0]), *(variances @ direction**2) ** 0.5
+        predicted = float(direction @ loads[0])
+        doubt, sigma = ((variances @ direction**2) ** 0.5).tolist()
         if self._since and stamp - self._last > OVER:
             ended = [] if self.alarm is None else [replace(self.alarm, until=self._last)]
             self.begin()
