@@ -24,11 +24,15 @@ CREPT = 4e-3  # m, least change of length for an alarm: a softening oil spring c
 
 
 class Creep(NamedTuple):
-    """Creeping of a cylinder since `onset` (ns): mean rate (m/s) and change of length (m), positive if it extends."""
+    """Creeping of a cylinder since `onset` (ns): mean rate (m/s) and change of length (m), positive if it extends.
+
+    is_even : True if it is even in the newest window, not a few short moves.
+    """
 
     onset: int
     rate: float
     change: float
+    is_even: bool
 
 
 class CreepMonitor:
@@ -68,14 +72,15 @@ class CreepMonitor:
             old = self.creeping.pop(i, None)
             if is_slow[i] and (is_even[i] or old is not None):
                 onset = self._seconds[0][0] if old is None else old.onset
-                self.creeping[i] = Creep(onset, float(rate[i]), float(rate[i]) * (stamp + SECOND - onset) / SECOND)
+                change = float(rate[i]) * (stamp + SECOND - onset) / SECOND
+                self.creeping[i] = Creep(onset, float(rate[i]), change, bool(is_even[i]))
         return self._news(stamp)
 
     def _news(self, stamp: int) -> list[Alarm]:
         gone = [i for i in self._alarms if i not in self.creeping]
         news = [replace(self._alarms.pop(i), until=stamp) for i in gone]
         for i, each in self.creeping.items():
-            if abs(each.change) >= CREPT and i not in self._alarms:
+            if abs(each.change) >= CREPT and each.is_even and i not in self._alarms:
                 name, told = f"cylinder_{i + 1}", f"by {1e3 * each.rate:+.2g} mm/s, {1e3 * each.change:+.2g} mm up to now"
                 self._alarms[i] = Alarm(name, "creeps", each.onset, None, f"{name}.drive", told)
                 news.append(self._alarms[i])

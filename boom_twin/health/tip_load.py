@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from ..types import Alarm, Array, Ranked
 
 CAUSE = "tip.load"
@@ -46,7 +44,7 @@ class TipLoadMonitor:
         size = max(float((loads[1] @ loads[1]) ** 0.5), 1e-300)
         direction = loads[1] / size
         predicted = float(direction @ loads[0])
-        doubt, sigma = np.sqrt(variances @ direction**2).tolist()
+        doubt, sigma = ((variances @ direction**2) ** 0.5).tolist()
         if self._since and stamp - self._last > OVER:
             ended = [] if self.alarm is None else [replace(self.alarm, until=self._last)]
             self.begin()
