@@ -8,8 +8,6 @@ import pytest
 from command import main
 from default_boom import default_text
 
-from boom_twin import load_scene
-
 MADE = ["init", "--table", "table.yaml", "--out", "boom.yaml"]
 
 
@@ -58,22 +56,6 @@ def test_a_warned_table_is_mended_and_written_anew(table: str, capsys: pytest.Ca
     assert main(again[1:]) == 0
     assert "sections[1].beam" not in capsys.readouterr().err
     assert main(["check", "boom.yaml", "--strict"]) == 0
-
-
-COLUMNS = {
-    "length": 8.3, "beam_start": 1.32, "beam_end": 7.8, "height": 0.56, "width": 0.42, "wall": 0.008, "rod_pin_x": 1.32,
-    "rod_pin_y": -0.264, "kind": "A", "range_deg_low": -5, "range_deg_high": 85, "bore": 0.18, "rod": 0.125,
-    "cylinder_pin_x": 0.99, "cylinder_pin_y": -2.75,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("name", "mark"), [("table.csv", ","), ("table.csv", ";"), ("table.csv", "\t"), ("table.tsv", "\t")])
-def test_a_table_as_spreadsheets_write_it(name: str, mark: str) -> None:
-    rows = mark.join(COLUMNS), mark.join(map(str, COLUMNS.values()))
-    Path(name).write_text("\n".join(rows), encoding="utf-8-sig")
-    assert main(["init", "--table", name, "--out", "boom.yaml"]) == 0
-    scene = load_scene("boom.yaml")
-    assert scene.sections[0].length == 8.3 and scene.base.pivot == (0.0, 0.0)  # without columns of the pivot, the origin
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -104,17 +101,6 @@ def test_quiet_leaves_out_what_is_no_result_and_no_failure(tmp_path: Path, capsy
     assert loud.out == quiet.out and loud.err.startswith("scene: ") and quiet.err == ""
     assert main(["info", str(tmp_path), "--quiet"]) == 1
     assert capsys.readouterr().err.startswith("boom_twin info: ")
-
-
-@pytest.mark.system
-def test_the_shell_is_told_what_may_follow(tmp_path: Path) -> None:
-    pytest.importorskip("argcomplete", reason="pip install .[test]")
-    answer, line = tmp_path / "answer", "boom_twin replay bag --no-"
-    asked = {"_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "COMP_LINE": line, "COMP_POINT": str(len(line))}
-    command = [sys.executable, "-m", "boom_twin"]
-    environment = {**os.environ, **asked, "_ARGCOMPLETE_STDOUT_FILENAME": str(answer)}
-    subprocess.run(command, env=environment, capture_output=True, timeout=300)
-    assert {word.strip() for word in answer.read_text().split("\n")} >= {"--no-pictures", "--no-health", "--no-changes"}
 
 
 def test_a_summary_as_json_is_flat_and_has_its_alarms() -> None:
