@@ -96,24 +96,6 @@ def test_refusals_of_the_command(capsys: pytest.CaptureFixture[str], tmp_path: P
     assert other.read_text() == "# by hand\n"
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("1mm", "like tip=1mm"),
-        ("tip=nan", "like tip=1mm"),
-        ("tip=-1mm", "must be positive and finite"),
-        ("tip=1in", "the unit 'in' is none of mm, cm, m"),
-        ("joint_1=1mm", "only the error of the tip can be stated"),
-    ],
-)
-def test_nonsense_is_one_clear_error(text: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["check", "--need", text])
-    out, err = capsys.readouterr()
-    assert stop.value.code == 2 and out == ""
-    assert words in err and err.count("error:") == 1
-
-
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory, two_sections: Scene) -> tuple[Path, Path]:
     """A scene file and where its lean one goes."""
