@@ -21,10 +21,6 @@ from rosbags.typesys import Stores, get_typestore
 
 from boom_twin import BagError, TimeWindow, load_scene, replay
 from boom_twin.batch.sources import sessions_of
-from boom_twin.offline.inputs import ReplayOptions
-from boom_twin.offline.replay import replay_into
-from boom_twin.offline.sample_table import SampleTable, columns_of, table_file
-from boom_twin.system.result_folder import REPLAY, result_folder
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
 JAZZY, NOETIC = get_typestore(Stores.ROS2_JAZZY), get_typestore(Stores.ROS1_NOETIC)
@@ -99,26 +95,6 @@ def moving(folder: Path) -> Path:
     imu = random.normal((0.0, 9.81), 0.05, (rows, 2))
     write_session(folder, stamps, strokes + random.normal(0.0, 2e-5, (rows, 4)), None, imu, {"origin": "synthetic, a test"})
     return folder
-
-
-def table_of(session: Path, out: Path) -> bytes:
-    with result_folder(out, REPLAY, [session]) as building:
-        file = table_file(building / "samples.csv", columns_of(4))
-        table = SampleTable(file.write, 4)
-        replay_into(building, session, load_scene(), options=ReplayOptions(health=False), take=table.add)
-        table.finish()
-        file.close()
-    return (out / "samples.csv").read_bytes()
-
-
-@pytest.mark.slow
-def test_replays_of_one_session_from_four_storages_give_the_same_table(tmp_path: Path) -> None:
-    source = moving(tmp_path / "mcap")
-    others = [stored(source, "db3", tmp_path), stored(source, "ros1", tmp_path)]
-    others.append(as_csv(source, tmp_path / "s.csv", since=1_700_000_000_000_000_000))  # its times begin with 0
-    expected = table_of(source, tmp_path / "a")
-    assert expected.count(b"\n") == 401
-    assert [table_of(other, tmp_path / f"out_{number}") == expected for number, other in enumerate(others)] == [True] * 3
 
 
 CSV = "t_s,stroke_1_m,stroke_2_m,joint_1_rad\n0,0.1,0.2,0.3\n0.1,0.1,0.2,\n"

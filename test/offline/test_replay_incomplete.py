@@ -93,20 +93,6 @@ def test_the_next_replay_takes_the_place_of_the_killed_one(killed: Path, session
     assert (out / "summary.json").is_file() and not killed.exists()
 
 
-def test_compare_replays_over_none_of_what_it_compares(
-    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Else it would compare the first with itself."""
-    out, earlier = tmp_path / "out", tmp_path / "out" / "A"
-    assert main(["replay", str(session), "--out", str(earlier), "--no-pictures", "--no-health"]) == 0
-    before = {path: path.read_bytes() for path in earlier.rglob("*") if path.is_file()}
-    assert main(["compare", str(session), str(earlier), "--out", str(out)]) == 1
-    assert f"{earlier} lies in {out}, and a source is never touched" in capsys.readouterr().err
-    assert main(["compare", str(earlier), str(earlier), "--out", str(earlier)]) == 1
-    assert "lies in the source, which is never touched" in capsys.readouterr().err
-    assert before == {path: path.read_bytes() for path in earlier.rglob("*") if path.is_file()}
-
-
 def unended(bag: Path) -> Path:
     """The session as a recorder leaves it that was killed after its last file was complete."""
     (bag / "session.yaml").write_text("boom_twin: 0.1.0\nstarted: 2026-01-02T03:04:05+00:00\nnote: |\n  ended: no\n")

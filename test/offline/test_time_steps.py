@@ -138,13 +138,6 @@ def test_files_after_a_clock_that_was_set_back_follow(tmp_path: Path) -> None:
     assert stamps == [sample.stamp for sample in found if sample.stream is Stream.STROKES]
 
 
-def test_a_replay_tells_of_a_clock_that_was_set_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = samples(rows=800)
-    logs = [sample.stamp - 3 * SECOND * (row >= 1200) for row, sample in enumerate(found)]
-    assert replayed(recorded(tmp_path / "bag.mcap", found, logs))["samples"] == 800
-    assert "warning: bag.mcap: log times step back 1 time, by 2.995 s in all" in capsys.readouterr().err
-
-
 def test_samples_that_wait_for_the_first_strokes_are_dropped_when_their_stamps_come_again() -> None:
     """A bag that is played again begins anew: its first round had no strokes."""
     first, twin = samples(rows=400), Twin(load_scene())
