@@ -12,9 +12,8 @@ from oracle import booms
 from oracle.clearance.scenes import with_pins
 from oracle.oscillation import mean_frequency
 
-from boom_twin import UsageError, load_scene, simulate, statics
+from boom_twin import load_scene, simulate, statics
 from boom_twin.analysis.balances import energy_balance, momentum_balance
-from boom_twin.analysis.methods import Method, integrate_with
 from boom_twin.analysis.simulate import course_of
 
 STIFFNESS, DAMPING = 5.0e6, 5.0e4  # N m/rad, N m s/rad
@@ -76,11 +75,6 @@ def test_balances_close_with_worn_pins_on_the_base():
     energy, momentum = energy_balance(course, 1e-3), momentum_balance(course, 1e-3)
     assert energy.contact > 5.0 and energy.damping > 0.5 and energy.share < 1e-6
     assert momentum.linear_share < 1e-7 and momentum.angular_share < 2e-5
-
-
-def test_the_plain_product_refuses_it():
-    with pytest.raises(UsageError, match=r"base\.stiffness"):
-        integrate_with(SCENE, motion_of(SCENE), 0.1, 1e-3, method=Method(product="plain"))
 
 
 def test_a_session_of_the_rig_replays(tmp_path, capsys):

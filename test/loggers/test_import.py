@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Callable
 from datetime import UTC
 from pathlib import Path
@@ -397,15 +396,6 @@ def test_damaged_binary_files_are_refused_in_one_line(
     assert main(["import", str(path), "--out", str(tmp_path / "s")]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert f"{path}: cannot be read (" in line and "Export it as CSV." in line
-
-
-def test_a_library_that_is_missing_is_named_with_the_extra(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "log.tdms").write_bytes(b"TDSm")
-    monkeypatch.setitem(sys.modules, "nptdms", None)
-    assert main(["import", str(tmp_path / "log.tdms"), "--out", str(tmp_path / "s")]) == 1
-    assert 'reading it needs nptdms, which is not installed. Run `pip install "boom_twin[import]"`.' in capsys.readouterr().err
 
 
 def test_the_columns_file_of_the_page_is_one_and_faults_are_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

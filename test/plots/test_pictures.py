@@ -14,9 +14,7 @@ from boom_twin import load_scene
 from boom_twin.analysis.undeflected import UndeflectedBoom
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.plots.extreme_rows import ExtremeRows
-from boom_twin.plots.history import Orbits
 from boom_twin.plots.joint_ranges import joint_ranges_picture
-from boom_twin.plots.posture import orbits_picture
 from boom_twin.plots.session_distributions import SEGMENT, density
 
 SCENE, ROWS = load_scene(), 40
@@ -45,18 +43,6 @@ def test_undeformed_outline_lies_on_the_sections() -> None:
     for point in line:
         shares = np.clip(np.sum((point - bones.pivots[:-1]) * along, axis=1) / np.sum(along**2, axis=1), 0.0, 1.0)
         assert np.hypot(*(point - bones.pivots[:-1] - shares[:, None] * along).T).min() < 1e-9
-
-
-@pytest.mark.parametrize("pins, instants", [(1, 50), (17, 1)])
-def test_journals_of_every_pin_are_drawn_and_the_same_bytes_again(tmp_path: Path, pins: int, instants: int) -> None:
-    turn = np.linspace(0.0, 6.0, instants)
-    rows = np.stack([1e-4 * np.cos(turn), 1e-4 * np.sin(turn), 1e3 + turn, (turn < 4.0).astype(float)], axis=1)
-    names, gaps, lost = tuple(f"cylinder_{i + 1}.rod" for i in range(pins)), np.full(pins, 1e-4), np.ones(pins, np.int64)
-    orbits = Orbits(np.linspace(0.0, 1.0, instants), names, gaps, np.tile(rows[:, None], (1, pins, 1)), lost)
-    for name in ("a.png", "b.png"):
-        orbits_picture(tmp_path / name, "journals", orbits)
-    first, second = ((tmp_path / name).read_bytes() for name in ("a.png", "b.png"))
-    assert first == second and first[:4] == b"\x89PNG"
 
 
 @pytest.mark.parametrize("count", [20, 101, 3000, 7001])

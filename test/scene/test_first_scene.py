@@ -104,19 +104,6 @@ def test_a_fault_of_the_table_names_its_line(tmp_path: Path, old: str, new: str,
     assert path.rpartition(".")[2] in line or "- {kind: B1" in line or "material:" in line
 
 
-def test_a_joint_that_cannot_do_its_range_is_refused_with_the_range_that_it_can_do(tmp_path: Path) -> None:
-    old = "range_deg: [-165, 10], bore: 200 mm"
-    assert EXAMPLE.count(old) == 1
-    with pytest.raises(SceneError) as caught:
-        scene_of(tmp_path, EXAMPLE.replace(old, "range_deg: [-200, 10], bore: 200 mm"))
-    (fault,) = caught.value.faults  # and none of postures, which the table does not name
-    assert fault.path == "joints[1].range_deg"
-    assert (fault.line or 0) == EXAMPLE[: EXAMPLE.index(old)].count("\n") + 1
-    assert "do not meet at -200.0 to" in fault.bound or "turns back at" in fault.bound
-    low = float(fault.remedy.partition("[")[2].partition(",")[0])
-    scene_of(tmp_path, EXAMPLE.replace(old, f"range_deg: [{low}, 10], bore: 200 mm"))  # is not refused
-
-
 SLIPS = [
     ("wall: 8 mm", "wall: 8 cm", "sections[0].wall", "with walls of 8"),
     ("bore: 200 mm, rod: 120 mm", "bore: 100 mm, rod: 60 mm", "joints[1].bore", "not radii"),
@@ -152,35 +139,3 @@ def test_a_spreadsheet_s_warnings_and_faults_name_its_cells(tmp_path: Path) -> N
     assert str(oddity).startswith("line 4: sections[1].beam (cells B4, C4) = [0.55, 6.55]")
     with pytest.raises(SceneError, match=re.escape("line 3: sections[1].wall (cell F3) = 6.0: two walls fill")):
         scene_of(tmp_path, CSV.replace("wall [mm]", "wall").replace("420,8", "420,0.008"), "table.csv")
-
-
-@pytest.mark.parametrize(
-    ("header", "row"), [("lenght,kind", "3,A"), ("length", ""), ("C,C_x,length_x", "1,2,3"), ("length", "1" * 200_000)]
-)
-def test_a_csv_table_that_is_none_is_refused(tmp_path: Path, header: str, row: str) -> None:
-    with pytest.raises(SceneError, match=r"no such column|it is needed|no row under|not a readable CSV"):
-        scene_of(tmp_path, f"{header}\n{row}\n", "table.csv")
-
-
-@pytest.mark.parametrize(
-    "before, after, told",
-    [
-        (
-            ",,,,,25,\n",
-            f",,,,,25,\n{CSV.splitlines()[2].replace(',25,', ',,')}\n",
-            r"sections\[2\]\.pipe is absent: other sections have 25",
-        ),
-        ("mL,mR,", "mL,mL,", r"header = 'mL': columns V and W have the same name"),
-        (",,,,,25,\n", ",,,,,25,40\n", r"payload, AC3 = '40': the first row has 60.*in the first row only"),
-        ("pivot_x,pivot_y,", "pivot_x,pivot_y,inclination,", r"inclination.* = 3.0?: rad or degrees\?.*3 deg or 3 rad"),
-    ],
-)
-def test_what_a_table_says_twice_or_without_unit_is_refused(tmp_path: Path, before: str, after: str, told: str) -> None:
-    assert before in CSV
-    text = CSV.replace(before, after, 1)
-    text = text.replace("-2.75,0,0,", "-2.75,0,0,3,").replace(",,,,,25,\n", ",,,,,,25,\n") if "inclination" in after else text
-    with pytest.raises(SceneError, match=told):
-        scene_of(tmp_path, text, "table.csv")
-    if "inclination" in after:  # with its unit it is taken
-        _, scene, _ = scene_of(tmp_path, text.replace("inclination,", "inclination [deg],"), "table.csv")
-        assert scene.base.inclination == pytest.approx(math.radians(3.0))
