@@ -60,12 +60,3 @@ def test_two_sources_then_a_flood(spawn_node: Callable[..., Any], new_rig: Calla
         rig.until(lambda: len(rig.answers) > answered + 20)  # predictions go on
     rig.until(lambda: rig.level("reception") == 0)
     assert node.stop() == 0 and len(node.said().splitlines()) < FEW, node.said()
-
-
-SOAK = Path(__file__).parents[1] / "bench" / "soak.py"
-
-
-@pytest.mark.slow
-def test_two_minutes_of_full_buffers_at_200_hz() -> None:
-    done = subprocess.run([sys.executable, str(SOAK), "--duration", "460"], capture_output=True, text=True, timeout=900)
-    assert done.returncode == 0, done.stdout + done.stderr

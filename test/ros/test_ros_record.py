@@ -166,29 +166,6 @@ def test_a_killed_recorder_loses_little(
     assert outcome.lost is None or not any(outcome.lost.values())
 
 
-def test_nothing_to_record(spawn: Callable[..., Any], tmp_path: Path) -> None:
-    record = spawn("boom_twin.cli.main", "record", "--out", str(tmp_path / "bag"), "--duration", "0.5")
-    assert record.end() == 1 and "nothing came" in record.said()
-    assert (tmp_path / "bag" / "metadata.yaml").is_file()
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--topics", "/a:no_such_msgs/msg/Thing"], "not an installed message type"),
-        (["--topics", "/a", "a"], "topic /a is named twice"),
-        (["--split-size", "10"], "must be at least 1M"),
-    ],
-)
-def test_refused_at_once(options: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    try:
-        code = main(["record", "--out", str(tmp_path / "bag"), *options])
-    except SystemExit as end:
-        code = int(end.code or 0)
-    assert code in (1, 2) and words in capsys.readouterr().err
-    assert not (tmp_path / "bag").exists()
-
-
 @pytest.mark.parametrize("inner", ["", "bag", "bag/today"])
 def test_nothing_is_recorded_into_what_was_left(inner: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     left = tmp_path / "out.unfinished"
