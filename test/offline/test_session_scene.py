@@ -15,10 +15,8 @@ from ros_messages import fill_header, load_topics, new_message
 
 from boom_twin import BagError, Settings, Stream, load_scene, replay
 from boom_twin.bag.session_sheet import FILE_NAME, sha256
-from boom_twin.diagnostics.boom_mismatch import OtherBoom
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.scene.load import DEFAULT_NAME
-from boom_twin.types import Alarm, Health
 
 FAULTY = "sections: []\n"
 
@@ -151,13 +149,3 @@ def test_a_scene_that_was_changed_is_told(five, tmp_path, capsys):
     (bag / FILE_NAME).write_text(sheet.replace("gravity", "# by hand\n  gravity", 1) + "baseline: of 0.1.0\n")
     assert main(["info", str(bag)]) == 0
     assert "was changed since the session was made" in capsys.readouterr().err
-
-
-def test_angles_of_another_boom_are_told_unless_their_wiring_explains_them():
-    right = np.array([1.04, -0.72, -0.88, -0.87]) + 1e-4 * np.random.default_rng(2).normal(size=(20, 4))
-    wired = Health(1, (Alarm("joint_1", "wiring", 0, None, "joint_1.sensor", "in degrees"),), np.zeros(2))
-    for health, is_told in ((None, True), (wired, False)):
-        judge = OtherBoom()
-        judge.hear(health)
-        judge.take(1, 3.0 * right, 2.0 * right)
-        assert judge.judge().startswith("joint_1 by ") == is_told
