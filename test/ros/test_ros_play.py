@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import pty
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -104,20 +102,6 @@ def test_again_and_again_until_it_is_stopped(spawn: Callable[..., Any], listener
     spin_until(listener, lambda: len(came) > 850)
     assert play.stop(signal.SIGINT) == 0
     assert "s: /tip_imu " in play.said() and "sent in" in play.said()
-
-
-def test_the_space_bar_pauses(spawn: Callable[..., Any], bag: Path) -> None:
-    ours, theirs = pty.openpty()
-    play = spawn(*PLAY, str(bag), "--wait", "0", "--rate", "2", stdin=theirs)
-    play.wait_for("space: pause")
-    play.wait_for("playing")
-    os.write(ours, b"x ")
-    play.wait_for("paused")
-    os.write(ours, b" ")
-    assert play.end() == 0, play.said()
-    assert "s: cylinder_strokes 800, joint_angles 800, tip_imu 800; at worst" in play.said()
-    os.close(ours)
-    os.close(theirs)
 
 
 @pytest.mark.parametrize("with_metadata", [True, False])

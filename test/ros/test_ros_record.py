@@ -15,7 +15,6 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
-from command import main
 from rcl_interfaces.msg import ParameterEvent
 from recordings import read, recover, scan
 from ros_rig import Rig, joint_state
@@ -164,13 +163,3 @@ def test_a_killed_recorder_loses_little(
     assert saved == list(range(saved[0], saved[0] + len(saved)))
     assert outcome.saved.total() == len(saved) >= told
     assert outcome.lost is None or not any(outcome.lost.values())
-
-
-@pytest.mark.parametrize("inner", ["", "bag", "bag/today"])
-def test_nothing_is_recorded_into_what_was_left(inner: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    left = tmp_path / "out.unfinished"
-    left.mkdir()
-    (left / "unfinished.json").write_text('{"command": "replay"}')
-    assert main(["record", "--out", str(left / inner), "--duration", "0.1"]) == 1
-    assert "lies in an unfinished result" in capsys.readouterr().err
-    assert [entry.name for entry in left.iterdir()] == ["unfinished.json"]
