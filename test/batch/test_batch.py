@@ -24,7 +24,6 @@ pytest.importorskip("distributed")
 from command import main  # noqa: E402
 
 from boom_twin import replay  # noqa: E402
-from boom_twin.batch.session_task import SessionTask, row_of  # noqa: E402
 from boom_twin.system.child_process import python_command  # noqa: E402
 
 COUNT = 5
@@ -172,32 +171,3 @@ def test_a_name_that_is_not_utf_8_costs_no_row(sessions: Path, tmp_path: Path, c
     rows = {row["session"]: row["status"] for row in parquet.read_table(out / "sessions.parquet").to_pylist()}
     assert rows == {"caf?": "ok", "torn": "failed"}, capsys.readouterr()
     assert "caf?" in (out / "batch.html").read_text(encoding="utf-8")
-
-
-def test_only_a_batch_is_gone_on_with(sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "mine.txt").write_text("x")
-    for out, told in ((tmp_path, "which no batch left"), (sessions, "a source is never touched")):
-        assert main(["batch", str(sessions / "s0"), "--out", str(out)]) == 1
-        assert told in capsys.readouterr().err
-    assert (tmp_path / "mine.txt").read_text() == "x" and len(list(tmp_path.iterdir())) == 1
-
-
-def test_no_scheduler_answers(
-    sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("boom_twin.batch.cluster.CONNECT_TIMEOUT", 0.5)
-    assert main(["batch", str(sessions / "s0"), "--out", str(tmp_path / "o"), "--scheduler", "tcp://127.0.0.1:1"]) == 1
-    assert "no Dask scheduler answers" in capsys.readouterr().err
-
-
-def task(key: str = "key", session: object = "s", out: object = "o", **changes: object) -> SessionTask:
-    given = {"fingerprint": "", "report": False, "keep_bag": False, "time": 600.0, "memory": 10**9, "retries": 0} | changes
-    for name in ("scene", "params", "mapping"):
-        given.setdefault(name, None)
-    return SessionTask(key, str(session), str(out), **given)  # type: ignore[arg-type]
-
-
-def test_a_session_that_tells_no_parameters_costs_these_only(sessions: Path, tmp_path: Path) -> None:
-    row = row_of(task("key", sessions / "s0", tmp_path / "out", calibrate=True))
-    assert row["status"] == "ok" and row["output_sha256"] and row["calibration_reason"]
-    assert not [name for name in row if name.startswith("calibrated_")]

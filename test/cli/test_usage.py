@@ -60,20 +60,6 @@ def test_section_angles_are_a_posture(posture: str, capsys: pytest.CaptureFixtur
     assert main(["response", "--posture", posture.strip(), "--tip", "-100,0", "--points", "3", "--json"]) == 0
 
 
-@pytest.mark.parametrize(
-    ("posture", "told"),
-    [
-        ("up", "posture = 'up': the scene has horizontal, arch, high, low. Choose one of these"),
-        ("60,20", "posture = '60,20': 2 angles for 4 sections. Give one for each."),
-        ("60,20,90,0", "turns joint 3 to 70 deg, outside its range_deg"),
-        ("nan,0,0,0", "turns joint 1 to nan deg, outside its range_deg"),
-    ],
-)
-def test_section_angles_that_no_boom_takes_are_refused(posture: str, told: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["statics", "--posture", posture]) == 1
-    assert told in capsys.readouterr().err
-
-
 def helped(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     with pytest.raises(SystemExit) as ended:
         main(arguments)

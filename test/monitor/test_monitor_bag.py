@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from monitor.conftest import GAP, read_all
-from recordings import read, scan, write_session
+from recordings import read, scan
 from ros_messages import TYPES, Output, load_topics
 
-from boom_twin import BagError, Settings, TimeWindow, UsageError, load_scene
+from boom_twin import Settings, TimeWindow, load_scene
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
 from boom_twin.monitor.data.status import Severity
@@ -106,13 +106,3 @@ def test_a_session_that_is_damaged_is_shown_up_to_there(replayed: Path, tmp_path
     file.write_bytes(content)
     feed = read_all(bag_feed(damaged, load_scene(), Settings()))
     assert "read up to" in feed.trouble and 5.0 < feed.store.newest == feed.end < 35.0
-
-
-def test_a_session_without_anything_to_show_is_refused(faulty: Path, tmp_path: Path) -> None:
-    with pytest.raises(BagError):
-        bag_feed(tmp_path, load_scene(), Settings())
-    with pytest.raises(UsageError, match="none"):
-        bag_feed(faulty, load_scene(), Settings(), mapping=tmp_path / "none.yaml")
-    stamps = 10**18 + 5_000_000 * np.arange(100)
-    write_session(tmp_path / "far", stamps, np.full((100, 4), 50.0), np.zeros((100, 4)), np.zeros((100, 2)), {})
-    assert "no stroke could be used" in read_all(bag_feed(tmp_path / "far", load_scene(), Settings())).trouble

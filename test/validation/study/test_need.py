@@ -82,20 +82,6 @@ def test_an_error_that_is_none_and_a_start_of_another_boom_or_further_off_is_ref
         propose(two_sections, 1e-3, start=two_sections.model_copy(update={"modes": 0}))
 
 
-def test_refusals_of_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    path, other = str(tmp_path / "boom.yaml"), tmp_path / "other.yaml"
-    other.write_text("# by hand\n")
-    for given, told in (
-        (["--out", "x.yaml"], "--out x.yaml: goes with --need only"),
-        (["--against", "x.yaml"], "--against x.yaml: goes with --need only"),
-        ([path, "--need", "tip=1mm", "--out", path], "this file is read. Name another one"),
-        (["--need", "tip=1mm", "--out", str(other)], "other.yaml: is there already, and is not written over"),
-    ):
-        assert main(["check", *given]) == 1
-        assert told in capsys.readouterr().err
-    assert other.read_text() == "# by hand\n"
-
-
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory, two_sections: Scene) -> tuple[Path, Path]:
     """A scene file and where its lean one goes."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from default_boom import joint_angles_of_strokes, motion_of, strokes_of_posture
+from default_boom import joint_angles_of_strokes, motion_of
 from oracle import booms
 from oracle.conftest import random_scene
 
-from boom_twin import Scene, load_scene
+from boom_twin import Scene
 from boom_twin.analysis.motions import TURN
 from boom_twin.reduction import deviation
 from boom_twin.reduction.variants import variants
@@ -26,17 +26,6 @@ def test_every_variant_is_there_ascending_in_error(found: parts.PartsStudy, two_
     assert errors == sorted(errors) and all(np.isfinite(errors))
     assert all(part.status == "ok" for part in found.parts)
     assert all(part.step_time > 0.0 for part in found.parts)
-
-
-def test_default_boom_moves_as_in_the_documentation():
-    scene = load_scene()
-    motion = motion_of(scene)
-    strokes, rates = motion(np.array([0.0, 0.75, 1.5, 4.0]))
-    assert motion.duration == 4.0 and "arch" in motion.label
-    assert strokes[0] == pytest.approx(strokes_of_posture(scene, "arch"), abs=1e-12)
-    assert strokes[1] - strokes[0] == pytest.approx([0.025, 0.0, 0.015, 0.0])
-    assert strokes[3] - strokes[0] == pytest.approx([0.05, 0.0, 0.03, 0.0])
-    assert not rates[[0, 2, 3]].any()
 
 
 SCENES = [*(booms.random_boom(seed) for seed in range(10)), *(random_scene(seed) for seed in range(10))]
