@@ -91,19 +91,3 @@ def test_a_session_of_the_rig_replays(tmp_path, capsys):
         found = json.loads(capsys.readouterr().out)
         errors.append((found["tip_error_rms_m"], found["tip_estimate_error_rms_m"]))
     assert max(errors[0]) < 2e-3 and min(errors[1]) > 0.03
-
-
-def test_commands(tmp_path, capsys):
-    path = tmp_path / "boom.yaml"
-    path.write_text(anew(SCENE))
-    assert main(["check", str(path)]) == 0
-    told = capsys.readouterr().out
-    assert "elastic base: 5 MN m/rad about the pivot of joint 1, 50 kN m s/rad" in told
-    assert "base        1  turn" in told and "base.stiffness" not in told
-    assert main(["statics", str(path), "--posture", "arch", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["base_turn_rad"] == pytest.approx(-4.880e-3, rel=1e-3)
-    path.write_text(anew(booms.on_elastic_base(RIGID, None, DAMPING)))
-    assert main(["check", str(path)]) == 1
-    told = capsys.readouterr().err
-    assert "base.damping = 50000.0" in told and "the base is rigid" in told and "Give stiffness" in told
