@@ -11,7 +11,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from recordings import FILE_NAME, MessageWriter, Session, read, read_metadata, recover, scan, write_metadata, write_session
-from ros_messages import Topic, jazzy, load_topics, new_message
+from ros_messages import Qos, Topic, jazzy, load_topics, new_message
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
@@ -19,7 +19,6 @@ from ruamel.yaml import YAML
 
 from boom_twin import BagError, Stream, UsageError
 from boom_twin.bag.inspect import inspect
-from boom_twin.messages.topic_table import Qos
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
 POINT = Topic(

@@ -16,13 +16,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from recordings import TRUTH, Session, read, scan, scene_of
+from ros_messages import Output, Topic, load_topics, stamp_of
 
 from boom_twin import BagError, BoomTwinError, Stream
-from boom_twin.bag.reader import Session, read, scan
-from boom_twin.bag.session_model import scene_of, settings_of
-from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.messages.topic_table import Output, Topic, load_topics
-from boom_twin.offline.ground_truth import FILE_NAME as TRUTH
+from boom_twin.bag.session_model import settings_of
 from boom_twin.offline.history import draw
 from boom_twin.offline.progress import progress_of
 from boom_twin.offline.recording import Stretch

@@ -22,8 +22,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ros_messages import Topics, load_topics
+
 from boom_twin import BoomTwinError
-from boom_twin.messages.topic_table import Topics, load_topics
 from boom_twin.ros.startup import require_rclpy
 
 USUAL, LARGEST = 101, 232

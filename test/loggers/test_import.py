@@ -12,12 +12,10 @@ import numpy as np
 import pytest
 from command import main
 from loggers.logger_files import SESSION, readings, three_german_files
-from recordings import read, scan
+from recordings import kept, read, scan, write_samples
 from ruamel.yaml import YAML
 
 from boom_twin import Sample, Stream, load_scene, replay, statics
-from boom_twin.bag.session_files import write_samples
-from boom_twin.bag.session_sheet import kept
 from boom_twin.loggers.column_file import load_columns
 
 STREAMS = {"cylinder_strokes": Stream.STROKES, "joint_angles": Stream.ANGLES, "tip_imu": Stream.IMU}

@@ -9,13 +9,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pytest
 from command import main
-from default_boom import examine_text, example_text, skeleton
+from default_boom import examine_text, example_text, skeleton, stroke_curve
 from drive_twin import drive_twin
 from ros_messages import Output, ReportEncoder, decoded
 
 from boom_twin import Sample, Scene, Settings, Stream, load_scene
 from boom_twin.messages.urdf import urdf
-from boom_twin.scene.kinematics import PassiveJoints, stroke_curve
+from boom_twin.scene.kinematics import PassiveJoints
 
 # What urdf.xsd of urdfdom and the wiki's page say of the elements used here: attributes, children
 # (name: fewest, most), all else refused.

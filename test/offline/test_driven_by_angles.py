@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from command import main
 from offline.by_the_node import assert_same_bytes
-from recordings import load_mapping, load_truth, read, scan
+from recordings import load_mapping, load_truth, read, scan, write_samples
 from ros_messages import SampleDecoder, load_topics, stamp_of
 
 from boom_twin import BagError, Sample, Stream, Twin, replay
-from boom_twin.bag.session_files import write_samples
 from boom_twin.types import StrokeReading
 
 BAGS = Path(__file__).parents[2] / "bags"

@@ -10,10 +10,9 @@ import pytest
 from command import main
 from default_boom import strokes_of_posture
 from drive_twin import drive_twin, note_drives
-from recordings import read, scan
+from recordings import read, scan, write_samples
 
 from boom_twin import BagError, Sample, Settings, Stream, load_scene, replay
-from boom_twin.bag.session_files import write_samples
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.protocol import layout
 

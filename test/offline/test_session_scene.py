@@ -10,11 +10,12 @@ from command import main
 from default_boom import default_text
 from drive_twin import note_drives
 from offline.booms_apart import scene_text, session
+from recordings import SHEET as FILE_NAME
 from recordings import MessageWriter, SessionSheet, scene_of
 from ros_messages import fill_header, load_topics, new_message
 
 from boom_twin import BagError, Settings, Stream, load_scene, replay
-from boom_twin.bag.session_sheet import FILE_NAME, sha256
+from boom_twin.bag.session_sheet import sha256
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.scene.load import DEFAULT_NAME
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from recordings import SHEET as FILE_NAME
 from recordings import SessionSheet
 
 from boom_twin import BagError, Settings, UsageError
 from boom_twin.bag.session_model import settings_of
-from boom_twin.bag.session_sheet import FILE_NAME
 from boom_twin.cli.output import open_session_settings
 from boom_twin.config.settings import Thresholds, load_thresholds
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ros_messages import Qos
 
 pytest.importorskip("rclpy")
 
@@ -24,7 +25,6 @@ from sensor_msgs.msg import Imu, JointState
 from boom_twin.bag.advice import publishable
 from boom_twin.bag.metadata import Recorded, offered_qos
 from boom_twin.bag.writer import BagWriter
-from boom_twin.messages.topic_table import Qos
 from boom_twin.ros.bag.player import CATCH_UP, Player
 from boom_twin.types import SECOND
 

@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from default_boom import examine
+from default_boom import examine, stroke_curve
 
 from boom_twin import Scene, SceneError
 from boom_twin.scene.boom_table import read_table
 from boom_twin.scene.first_scene import first_scene
-from boom_twin.scene.kinematics import stroke_curve
 from boom_twin.scene.oil_spring import middle_stiffness
 
 EXAMPLE = (files("boom_twin") / "msg_config" / "boom_table.yaml").read_text(encoding="utf-8")

@@ -7,11 +7,10 @@ from typing import Any
 
 import pytest
 from command import main
-from default_boom import clearance_text, default_text, example_text, with_end_mark
+from default_boom import clearance_text, default_text, example_names, example_text, with_end_mark
 from scene.editing import OIL, example, put
 
 from boom_twin import SceneError, load_scene
-from boom_twin.scene.load import example_names
 from boom_twin.scene.summary import explain
 
 # Each row: the place that is edited and, if it is another one, the place of the warning; the new value; words of the message.
