@@ -97,14 +97,6 @@ def test_a_boom_that_strokes_do_not_drive_leaves_them_out():
     assert twin.update(Sample(Stream.ANGLES, angles[-1].stamp + 5_000_000, np.full(4, np.nan))).prediction is None
 
 
-def test_check_states_the_accuracy_beside_angles(capsys):
-    assert main(["check", "--drive", "angles", "--sensors", "imu", "--json"]) == 0
-    found = capsys.readouterr().out
-    assert '"accuracy_arch:angles only"' in found and '"accuracy_arch:imu"' in found
-    assert main(["check", "--drive", "angles", "--sensors", "angles"]) == 1
-    assert "they drive the model" in capsys.readouterr().err
-
-
 def test_an_imu_elsewhere_goes_with_angles(tmp_path):
     """The readings of the tip IMU, as those of another one that the mapping places there."""
     folder, mapping = tmp_path / "session", tmp_path / "mapping.yaml"
