@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from command import main
 from default_boom import joint_angles_of_strokes, strokes_of_posture
+from fuzz.mcap_files import write as write_file
 from mcap.reader import make_reader
-from mcap.writer import IndexType, Writer
+from mcap.writer import IndexType
 from recordings import MessageWriter, read, scan, sensor_message
 from ros_messages import jazzy, load_topics, stamp_of
 
@@ -72,19 +73,10 @@ def test_memory_of_a_replay_goes_by_its_samples(tmp_path: Path, days: int, littl
 
 def recorded(path: Path, found: list[Sample], logs: list[int], **options: Any) -> Path:
     """One file of samples in their order, by the mcap library."""
-    inputs, channels = load_topics().inputs, dict[Stream, int]()
-    with path.open("wb") as stream:
-        writer = Writer(stream, **options)
-        writer.start(profile="ros2", library="test")
-        for sample, log in zip(found, logs, strict=True):
-            topic = inputs[sample.stream]
-            if sample.stream not in channels:
-                schema = writer.register_schema(topic.type, "ros2msg", b"")
-                channels[sample.stream] = writer.register_channel(topic.absolute, "cdr", schema)
-            data = bytes(jazzy().serialize_cdr(sensor_message(sample), topic.type))
-            writer.add_message(channels[sample.stream], log, data, log)
-        writer.finish()
-    return path
+    topics, encode = load_topics().inputs, jazzy().serialize_cdr
+    own = [(topics[sample.stream], sensor_message(sample), log) for sample, log in zip(found, logs, strict=True)]
+    rows = ((topic.absolute, topic.type, "cdr", log, bytes(encode(message, topic.type))) for topic, message, log in own)
+    return write_file(path, rows, **options)
 
 
 def as_database(source: Path, path: Path) -> Path:
