@@ -11,7 +11,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from recordings import FILE_NAME, MessageWriter, Session, read, read_metadata, recover, scan, write_metadata, write_session
-from ros_messages import Qos, Topic, jazzy, load_topics, new_message
+from ros_messages import Qos, Topic, jazzy, load_topics, new_message, stamp_of
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
@@ -57,7 +57,7 @@ def test_what_is_written_is_read(bag: Path, arrays: dict[str, Any], wanted: dict
     forces = [(msg.linear_acceleration.x, msg.linear_acceleration.z) for msg in rows["tip_imu"]]
     np.testing.assert_array_equal(forces, arrays["imu"])
     assert rows["joint_angles"][5].name == ["joint_1", "joint_2", "joint_3"]
-    stamps = [msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec for msg in rows["tip_imu"]]
+    stamps = [stamp_of(msg) for msg in rows["tip_imu"]]
     assert stamps == arrays["stamps_ns"].tolist()
 
 

@@ -13,6 +13,7 @@ import pytest
 from command import main
 from loggers.logger_files import SESSION, readings, three_german_files
 from recordings import kept, read, scan, write_samples
+from ros_messages import stamp_of
 from ruamel.yaml import YAML
 
 from boom_twin import Sample, Stream, load_scene, replay, statics
@@ -102,10 +103,7 @@ STYLES = {  # first stamp (ns) and options of made-up files as these programs wr
 def messages(session: Path, topic: str = "cylinder_strokes") -> list[tuple[int, dict[str, float]]]:
     """Stamps (ns) and values by name."""
     found = read(scan(session), {topic: "sensor_msgs/msg/JointState"})
-    return [
-        (msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec, dict(zip(msg.name, msg.position.tolist(), strict=True)))
-        for _, _, msg in found
-    ]
+    return [(stamp_of(msg), dict(zip(msg.name, msg.position.tolist(), strict=True))) for _, _, msg in found]
 
 
 @pytest.mark.parametrize("style", STYLES)

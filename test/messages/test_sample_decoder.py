@@ -215,11 +215,6 @@ def test_an_encoder_a_turn_off_is_taken_modulo_a_turn_where_its_range_decides(re
     assert cycles(inclinometer, [(1, {"joint_1": 5.0})]) == [(1, [5.0])]
 
 
-def test_a_sign_of_life_without_names_is_nothing_odd() -> None:
-    decoder = SampleDecoder(2)
-    assert decoder.samples([Stream.STROKES], 0, joint_state([], [])) == [] and not decoder.oddities and not decoder.refused
-
-
 def test_two_sources_of_one_topic_are_told_and_neither_is_used() -> None:
     """Zeros of a joint_state_publisher beside the encoders, with the same names and stamps; when they end, the encoders are."""
     decoder, encoders = SampleDecoder(2), np.random.default_rng(1).normal(0.5, 1e-4, (400, 2))
