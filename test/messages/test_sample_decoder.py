@@ -23,9 +23,7 @@ OTHER_NAMES = st.text(max_size=12).filter(lambda name: not name.startswith(("joi
 
 @settings(deadline=None)
 @given(
-    values=st.lists(FINITE, min_size=1, max_size=6),
-    others=st.lists(st.tuples(OTHER_NAMES, FINITE), max_size=4),
-    data=st.data(),
+    values=st.lists(FINITE, min_size=1, max_size=6), others=st.lists(st.tuples(OTHER_NAMES, FINITE), max_size=4), data=st.data()
 )
 def test_any_order_and_extra_names(values: list[float], others: list[tuple[str, float]], data: st.DataObject) -> None:
     pairs = [(f"joint_{i}", value) for i, value in enumerate(values, 1)] + others

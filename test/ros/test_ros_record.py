@@ -72,11 +72,7 @@ def received(rig: Rig, topic: str) -> float:
 
 def test_any_topics_with_a_sheet_and_splits(spawn: Callable[..., Any], new_rig: Callable[..., Rig], tmp_path: Path) -> None:
     out, rig = tmp_path / "bag", new_rig()
-    with (
-        Source("odd_strokes", JointState, strokes),
-        Source("/odd", ParameterEvent, odd),
-        Source("/other", ParameterEvent, odd),
-    ):
+    with Source("odd_strokes", JointState, strokes), Source("/odd", ParameterEvent, odd), Source("/other", ParameterEvent, odd):
         topics = ["odd_strokes", "/odd", "/never:std_msgs/String", "/other:sensor_msgs/JointState"]
         options = ["--split-duration", "0.5", "--note", "wind: 5 m/s\nx", "--origin", "a test"]
         record = spawn("boom_twin.cli.main", "record", "--out", str(out), "--topics", *topics, *options)
