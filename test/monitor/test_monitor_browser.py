@@ -51,7 +51,7 @@ def opened(browser: Any, monitor: MonitorProcess, width: int, height: int, **opt
     page.on("request", lambda request: page.asked.append(request.url))
     page.on("pageerror", lambda error: page.errors.append(str(error)))
     page.goto(monitor.url)
-    wait(page, "window.twin?.timeline.isRead", 300_000)  # a page in another language reads its texts first
+    wait(page, "window.twin?.timeline.isRead", 900_000)  # a page in another language reads its texts first
     go(page, FAULT)
     return page
 
