@@ -28,6 +28,7 @@ setup(
             *(f"msg_config/*.{end}" for end in ("yaml", "rviz", "json", "xml")),
             "examples/*.yaml",
             "monitor/page/*",
+            "report/templates/*.html",
         ]
     },
     data_files=[
@@ -51,6 +52,7 @@ setup(
         "matplotlib>=3.9.1,<4",
         "tqdm>=4.66.3,<5",
         "pint>=0.24,<1",
+        "jinja2>=3.1.6,<4",
     ],
     extras_require={
         "ros": ["ros-jazzy-rclpy[fastrtps]>=7.1,<8", "ros-jazzy-common-interfaces>=5.3,<6"],

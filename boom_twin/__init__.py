@@ -5,7 +5,6 @@ The stable API, imported when first used::
     load_scene(path=None) -> Scene                      the boom; without a path, the default scene
     statics(scene, "arch")                              equilibrium, forces, natural frequencies; or at strokes
     simulate(scene, times, strokes, dt=1e-3)            the boom's answer to given strokes
-    undeflected(scene, strokes, joint_rates=None)       a state that a simulation may start from
     frequency_response(scene, frequencies, posture=..)  the boom's answer to a harmonic force or stroke
     Twin(scene, settings=None).update(sample)           sample by sample: prediction, residuals
     replay(bag, scene, out)                             a recorded session or a table of readings through the twin
@@ -25,10 +24,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .analysis.equilibrium import statics
     from .analysis.frequency_response import frequency_response
-    from .analysis.initial_state import undeflected
     from .analysis.simulate import simulate
+    from .bag.session_file import TimeWindow
     from .bag.session_writer import SessionWriter
-    from .bag.time_window import TimeWindow
     from .config.settings import Settings, load_settings
     from .errors import BagError, BoomTwinError, SceneError, SceneWarning, SolverError, UsageError
     from .monitor.live_page import LivePage
@@ -42,10 +40,9 @@ __version__ = "0.2.0"
 _NAMES = {
     "analysis.equilibrium": "statics",
     "analysis.frequency_response": "frequency_response",
-    "analysis.initial_state": "undeflected",
     "analysis.simulate": "simulate",
     "bag.session_writer": "SessionWriter",
-    "bag.time_window": "TimeWindow",
+    "bag.session_file": "TimeWindow",
     "config.settings": "Settings load_settings",
     "errors": "BagError BoomTwinError SceneError SceneWarning SolverError UsageError",
     "monitor.live_page": "LivePage",
@@ -78,7 +75,6 @@ __all__ = [
     "replay",
     "simulate",
     "statics",
-    "undeflected",
 ]
 
 

@@ -44,7 +44,7 @@ class Prediction:
     clearances : ndarray, shape (k, 4), or None
         Of every pin with clearance the journal's offset x, y (m), contact force (N), and 1 where it touches.
     moments : ndarray, shape (k,), or None
-        Bending moment (N m) at the stations of `boom_twin.analysis.bending_moments`, positive where it bends the outer end up.
+        Bending moment (N m) at the stations of `boom_twin.analysis.bending_stress`, positive where it bends the outer end up.
     """
 
     stamp: int

@@ -51,6 +51,7 @@ SENTENCES = {
         "{thing} is wired otherwise than the mapping says", "Record slow moves, then run `boom_twin mapping --check`"
     ),
     "late": Sentence("stamps of {thing} are late", "Correct their delay in the mapping"),
+    "late cylinder_strokes": Sentence("stamps of {thing} are late", "Give all other streams the negative delay in the mapping"),
     "deviation": Sentence("{thing} does not fit the cylinder lengths", "Compare both at rest, then set the zero"),
     "deviation cylinder_force": Sentence(
         "{thing} does not fit the model", "Check payload and line fill, then the sensor's zero"

@@ -345,7 +345,7 @@ class Report:
     residuals: tuple[Residuals, ...] = ()
     """Residuals that became known by this sample, in order of their stamps."""
     events: tuple[str, ...] = ()
-    """Irregularities, by the names in `boom_twin.twin.events.EVENTS`."""
+    """Irregularities, by the names in `boom_twin.twin.blocks.EVENTS`."""
     status: str = "ok"
     """``ok``, or one sentence on a failure of the model."""
     change: Change | None = None

@@ -22,7 +22,7 @@ from boom_twin.config.settings import Settings, Thresholds, is_live
 
 ROOT = Path(__file__).parents[1]
 ROOT_PAGES = ("CONTRIBUTING.md", "CHANGELOG.md")
-NOTATION, SETTINGS = "boom_twin/scene/notation.py", "boom_twin/config/settings.py"
+NOTATION, SETTINGS = "boom_twin/kernels/__init__.py", "boom_twin/config/settings.py"
 OWN_PAGES = {"README.md": "index.md", NOTATION: "notation.md", SETTINGS: "settings.md", **{name: name for name in ROOT_PAGES}}
 TAGS, TEXT = r"(?:<[^>]+>)*", r"(?:<[^>]+>|[^()<])*"
 SHAPE = re.compile(rf"\({TAGS}ndarray{TAGS}, {TAGS}shape{TAGS}\(({TEXT}(?:\({TEXT}\){TEXT})?)\)\)")
@@ -51,14 +51,16 @@ def modules(room: str) -> list[str]:
     if not place.is_dir():
         return [f"boom_twin.{room}"]
     paths = sorted(place.rglob("*.py"), key=lambda path: (len(path.parts), path))
-    files = [path.relative_to(ROOT) for path in paths if path.name != "__init__.py" and path != ROOT / NOTATION]
+    files = [path.relative_to(ROOT) for path in paths if path.name != "__init__.py"]
     return [".".join(file.with_suffix("").parts) for file in files]
 
 
 def room_page(room: str) -> str:
     """Markdown of a page of the reference."""
     place = ROOT / "boom_twin" / room
-    head = f"# {room}\n\n{docstring(place / '__init__.py')}\n" if place.is_dir() else ""
+    told = docstring(place / "__init__.py") if place.is_dir() else ""
+    told = told.partition("\n\n")[0] if place / "__init__.py" == ROOT / NOTATION else told  # it has a page of its own
+    head = f"# {room}\n\n{told}\n" if place.is_dir() else ""
     return head + "".join(f"\n::: {module}\n    options: {{heading_level: 2}}\n" for module in modules(room))
 
 

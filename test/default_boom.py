@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from boom_twin.analysis.motions import motion_of
+from boom_twin.analysis.methods import motion_of
 from boom_twin.scene.edit import anew, loaded, parameter, parameter_names, with_parameters, with_rigid_cylinders
 from boom_twin.scene.kinematics import (
     joint_angles_of_strokes,

@@ -10,7 +10,7 @@ import pytest
 
 import boom_twin
 from boom_twin.texts import LANGUAGES, LIKELY, SENTENCES, THINGS, alarm_text, likelihood, translated, translations
-from boom_twin.twin.events import event_meaning
+from boom_twin.twin.blocks import event_meaning
 from boom_twin.types import SENSORS, StrokeReading
 
 PAGE = Path(boom_twin.__file__).parent / "monitor" / "page"

@@ -7,7 +7,6 @@ limited against overshoot. `scipy.interpolate.PchipInterpolator` is equal, but i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,12 +15,14 @@ from numpy.typing import NDArray
 
 from ..compiler.plan import Plan, first_row, taken_apart, width_of
 from ..errors import SolverError
+from ..kernels.elements.cylinder import write_drives
 from ..kernels.elements.pin_contact import LOST
-from ..kernels.integrators import GENERALISED_ALPHA, prepare
+from ..kernels.integrators import GENERALISED_ALPHA
 from ..kernels.result_row import Results
-from ..kernels.tables import OK, SENTENCES, State, Work
-from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance, run
-from ..types import Array
+from ..kernels.tables import State, Work
+from ..kernels.transfer.time_step import run
+from ..system.result_text import numbers
+from ..types import Array, StrokeReading
 
 
 def pchip(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
@@ -104,7 +105,7 @@ class DriveCourse:
         plan, state = self.plan, State(*(array.copy() for array in self.start))
         out = np.empty((len(rows), width_of(plan)))
         out[0] = first_row(plan, state)
-        steps, counts, drives, rates, loads = self._drive(self.times[rows], self.strokes[rows], dt, finer)
+        steps, counts, drives, rates, loads = self.steps(rows, dt, finer)
         self.work.load[:] = self.first_load
         status, row, passes, jolt, shake = run(
             plan.tables, state, self.work, steps, counts, drives, rates, loads, GENERALISED_ALPHA, self.rho, STEP_TOLERANCE,
@@ -116,38 +117,14 @@ class DriveCourse:
             float(counts @ steps**2), float(steps.max(initial=0.0)), at_rows, state.contacts[:, LOST].astype(np.int64), state,
         )  # fmt: skip
 
-    def states(self, dt: float, finer: int = 1) -> Iterator[tuple[float, State]]:
-        """Simulate through all rows in the steps of `stepped`; yield each step (s) and the state after it.
-
-        The same state object is yielded each time and changes with the next step; ``work.load[1]`` is its force at the tip.
-        SolverError if a step fails.
-        """
-        plan, work, state, row = self.plan, self.work, State(*(array.copy() for array in self.start)), 0
-        steps, counts, drives, rates, loads = self._drive(self.times, self.strokes, dt, finer)
-        work.load[:] = self.first_load
-        for span, count in zip(steps.tolist(), counts.tolist(), strict=True):
-            scheme = prepare(GENERALISED_ALPHA, self.rho, span, work.weights)
-            for _ in range(count):
-                if len(loads):
-                    work.load[:] = work.load[1], loads[row]
-                status, _, _ = advance(
-                    plan.tables, state, work, scheme, drives[row], rates[row], STEP_TOLERANCE, PASSES, LONGEST_INCREMENT, None,
-                    ANEW,
-                )  # fmt: skip
-                if status != OK:
-                    raise SolverError(f"step {row + 1} of {len(drives)} failed: {SENTENCES[status]}.")
-                row += 1
-                yield span, state
-
     @property
     def first_load(self) -> Array:
         """Force at the tip at the first row, N, shape (2,)."""
         return np.asarray(force_at(self.force, self.times[:1])[0])
 
-    def _drive(
-        self, times: Array, strokes: Array, dt: float, finer: int
-    ) -> tuple[Array, NDArray[np.int64], Array, Array, Array]:
-        """Return step size and count before every row but the first; drives, rates and tip forces after each step."""
+    def steps(self, rows: NDArray[np.int64], dt: float, finer: int) -> tuple[Array, NDArray[np.int64], Array, Array, Array]:
+        """Return step size and count before each of `rows` but the first; drives, rates and tip forces after each step."""
+        times, strokes = self.times[rows], self.strokes[rows]
         spans = np.diff(times)
         counts = finer * np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
         if len(spans) == 0:
@@ -158,3 +135,42 @@ class DriveCourse:
         at = np.repeat(times[:-1], counts) + inside * np.repeat(steps, counts)
         lengths, rates = pchip(times, self.plan.closed_lengths + strokes, np.minimum(at, times[-1]))
         return steps, counts, lengths, rates, force_at(self.force, at) if len(self.force) else np.zeros((0, 2))
+
+
+def spring_free(plan: Plan, lengths: Array, forces: Array) -> Array:
+    """Return the drives (m), shape (n,), of cylinders that are `lengths` (m) long at rest under `forces` (N)."""
+    drives = drives_as_read(plan, lengths, forces, StrokeReading.LENGTH)
+    if np.isfinite(drives).all():
+        return drives
+    raise SolverError(f"no drives for cylinder forces of {numbers(forces)} N: the oil gives too much. Check bulk_modulus.")
+
+
+def drives_as_read(plan: Plan, strokes: Array, forces: Array, reads: StrokeReading) -> Array:
+    """Return the drives (m) where transducers read `strokes` (m) under `forces` (N), all (.., n); NaN if there are none.
+
+    At work lengths swing with the forces in the oil. Drives show how the boom is driven, and in which posture it would rest.
+    The oil's damping is left out: its lag is some milliseconds.
+    """
+    drives = np.array(strokes)
+    if reads is not StrokeReading.DRIVE:
+        write_drives(
+            plan.tables.cylinders, plan.tables.oils, np.ascontiguousarray(np.atleast_2d(forces)), np.atleast_2d(drives)
+        )
+    return drives
+
+
+def drives_of(plan: Plan, times: Array, lengths: Array, forces: Array) -> Array:
+    """Return the drives (m), shape (m, n), of cylinders with these lengths (m) and forces (N) at `times` (s), at rest at first.
+
+    The extension x of an oil spring follows d x' + k x = F. The solution is exact for forces that are linear from row to row.
+    """
+    drives = [spring_free(plan, lengths[0], forces[0])]
+    for span, now, before, after in zip(np.diff(times), lengths[1:], forces, forces[1:], strict=False):
+        extension = lengths[len(drives) - 1] - drives[-1]
+        compliance, lag = plan.compliances_and_lags(plan.closed_lengths + now - extension)
+        with np.errstate(divide="ignore"):
+            kept = np.exp(-span / lag)
+        start, end = compliance * before, compliance * after
+        lead = (end - start) / span * lag
+        drives.append(now - (end - lead + (extension - start + lead) * kept))
+    return np.array(drives)

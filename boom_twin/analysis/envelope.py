@@ -19,7 +19,7 @@ from ..errors import SolverError
 from ..scene.kinematics import posture_angles, skeleton, strokes_of_angles
 from ..scene.schema import Scene
 from ..types import Array
-from .bending_moments import moments_by_unknowns, stations
+from .bending_stress import moments_by_unknowns, stations
 from .equilibrium import settle
 from .modal import natural_modes
 

@@ -21,10 +21,10 @@ from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_posture
 from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..system.summary_display import SummaryDisplay, numbers
+from ..system.result_text import SummaryDisplay, numbers
 from ..types import Array
-from .cylinder_drives import spring_free
 from .doubts import beyond_validity
+from .drive import spring_free
 from .modal import Mode, constraints, natural_modes, negative_pivots
 
 CLAMP = 1e12  # N/m, stiffness of a practically ideal pin
@@ -90,7 +90,7 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
 
 
 TOLERANCE = 1e-9  # rad, increment in the last pass; the remaining error is its square
-PASSES = 60
+PASSES = np.int64(60)  # typed, see `kernels.transfer.time_step.ANEW`
 LONGEST_INCREMENT = 0.1  # rad per pass
 FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # first and smallest load step, as fractions of gravity, if the full load fails
 LEAST_CLEARANCE_STEP = 1e-3  # smallest clearance step, as a fraction of the clearances
@@ -137,7 +137,7 @@ class Equilibrium(SummaryDisplay):
         return np.array([mode.frequency for mode in self.modes])
 
     def summary_rows(self) -> dict[str, str]:
-        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        """See `boom_twin.system.result_text.SummaryDisplay`."""
         return {
             "tip": f"{numbers(self.tip)} m",
             "deflection": f"{numbers(self.tip - self.tip_rigid, 1e3)} mm",

@@ -1,6 +1,6 @@
 """Frequency response about the deflected equilibrium: from a force at the tip or a cylinder's drive to tip, joints, forces.
 
-The boom linearised at rest is solved at every frequency by the complex sweeps of `kernels.transfer.frequency_response`; no
+The boom linearised at rest is solved at every frequency by the complex sweeps of `kernels.transfer.vibration`; no
 natural mode is left out. A flexible part bends in at least `SHAPES` shapes, however few the scene has `modes`: so many that up
 to 30 Hz more change nothing (see `with_all_shapes`). Pins with clearance are linearised where their journals rest: tangent of
 the contact's force at the static penetration, and its damping.
@@ -21,12 +21,12 @@ from ..kernels.elements.pin_contact import CLOSED
 from ..kernels.tables import BEAM, JOINT_A, JOINT_B, OK, SENTENCES, Z_SECTION, Motion, State, Tables, Work, complex_scratch
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
-from ..kernels.transfer.frequency_response import TIP_FORCE, harmonic_response
+from ..kernels.transfer.vibration import TIP_FORCE, harmonic_response
 from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..system.summary_display import SummaryDisplay
+from ..system.result_text import SummaryDisplay
 from ..types import Array, ComplexArray
-from .bending_moments import Station, moments_by_unknowns, stations
+from .bending_stress import Station, moments_by_unknowns, stations
 from .equilibrium import rest_at, strokes_and_angles
 from .modal import drive_at_rest
 

@@ -17,7 +17,7 @@ from ..compiler.plan import Plan
 from ..errors import SolverError
 from ..kernels.tables import OK, SENTENCES, State, Work
 from ..kernels.transfer.forward_kinematics import place
-from ..kernels.transfer.natural_frequency import NOT_COUNTED, bisect_frequency, count_below, inertia_response, position_change
+from ..kernels.transfer.vibration import NOT_COUNTED, bisect_frequency, count_below, inertia_response, position_change
 from ..types import Array
 
 HIGHEST_RATE = 1e7  # rad/s, upper limit of the search
@@ -49,7 +49,7 @@ def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
 
 
 class _AtRest:
-    """Boom in equilibrium: arguments of `boom_twin.kernels.transfer.natural_frequency`, with scratch."""
+    """Boom in equilibrium: arguments of `boom_twin.kernels.transfer.vibration`, with scratch."""
 
     def __init__(self, plan: Plan, state: State, work: Work) -> None:
         place(plan.tables, state, work)

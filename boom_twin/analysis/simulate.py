@@ -1,4 +1,4 @@
-"""Simulate the boom's answer to a stroke history, from rest or a given state, with an estimate of its error."""
+"""Simulate the boom's answer to a stroke history, from rest or the end of another, with an estimate of its error."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from ..compiler.compile import compile_scene
 from ..errors import SolverError, UsageError
-from ..kernels.tables import OK, SENTENCES
+from ..kernels.elements.pin_contact import LOST
+from ..kernels.tables import OK, SENTENCES, State
 from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..system.summary_display import SummaryDisplay, data_frame, numbers
+from ..system.result_text import SummaryDisplay, data_frame, numbers
 from ..types import Array
-from .cylinder_drives import drives_of
 from .doubts import (
     EstimatedError,
     joint_doubts,
@@ -30,10 +30,9 @@ from .doubts import (
     too_fast,
     warnings_of,
 )
-from .drive import NO_FORCE, DriveCourse, Run, force_at
+from .drive import NO_FORCE, DriveCourse, Run, drives_of, force_at
 from .equilibrium import rest_at, travel_words
-from .initial_state import InitialState, started, state_now
-from .steady_state import LARGEST_FORCE
+from .steady_state import check_force_rows
 
 RHO = 0.8
 CLOSEST = 1e-6  # s, between rows: rounding of positions over the square of a shorter step is more than 0.01 m/s^2
@@ -52,11 +51,6 @@ class Simulation(SummaryDisplay):
         Drives, and lengths of the cylinders pin to pin less `closed_length`, m; rad; N (tension positive).
     tip, tip_velocity, tip_acceleration : ndarray, shape (m, 3)
         x, y, orientation of the last head, in m and rad, and their rates.
-    passes : float
-        Newton passes per step, mean.
-    step_error : float
-        Sum of the errors of all steps in the position of the tip, m: about what stepping may have added to it. One step's is
-        |beta - 1/6| h^2 |a' - a| (Zienkiewicz and Xie 1991, for Newmark's family).
     step_errors, row_errors : tuple of EstimatedError
         Estimated errors of tip, acceleration and forces, from steps and from what lies between the rows of the drive; empty
         where they were not asked for.
@@ -70,7 +64,7 @@ class Simulation(SummaryDisplay):
         cylinder's eye is the journal, of a section's pivot the outer section, of a link's pin the link, of Q link R.
     lost_contacts : ndarray of int, shape (k,)
         How often each of them lost contact.
-    end : InitialState
+    end : boom_twin.kernels.tables.State
         The boom at the last row, from which another simulation may go on.
     """
 
@@ -82,15 +76,13 @@ class Simulation(SummaryDisplay):
     tip: Array
     tip_velocity: Array
     tip_acceleration: Array
-    passes: float
-    step_error: float
     step_errors: tuple[EstimatedError, ...]
     row_errors: tuple[EstimatedError, ...]
     doubts: tuple[str, ...]
     pin_names: tuple[str, ...]
     pins: Array
     lost_contacts: NDArray[np.int64]
-    end: InitialState
+    end: State
 
     @property
     def doubt(self) -> str:
@@ -122,7 +114,7 @@ class Simulation(SummaryDisplay):
         return data_frame(self.columns())
 
     def summary_rows(self) -> dict[str, str]:
-        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        """See `boom_twin.system.result_text.SummaryDisplay`."""
         return {
             "rows": f"{len(self.times)}, {self.times[-1] - self.times[0]:.4g} s",
             "tip at the end": f"{numbers(self.tip[-1, :2])} m",
@@ -139,11 +131,11 @@ def simulate(
     angles: Array | None = None,
     rho: float = RHO,
     estimate_errors: bool = True,
-    start: InitialState | None = None,
+    start: State | None = None,
     lengths: Array | None = None,
     force: Array | None = None,
 ) -> Simulation:
-    """Start at rest in the equilibrium of the first row, or from a given state, and follow the drives or the lengths.
+    """Start at rest in the equilibrium of the first row, or where another motion ended, and follow drives or lengths.
 
     Lengths are constraints: the boom moves as with incompressible cylinders. Their forces give the oil springs' extension, and
     that the drives.
@@ -165,8 +157,8 @@ def simulate(
     estimate_errors : bool
         Step the motion again with half the step and by every second row, to tell how far it can be trusted; takes four to
         seven times as long as stepping once.
-    start : InitialState, optional
-        Where the boom is and how it moves at the first row, instead of at rest: `boom_twin.undeflected`, or `Simulation.end`.
+    start : boom_twin.kernels.tables.State, optional
+        `Simulation.end` of a motion of the same boom, to go on from there instead of from rest.
     lengths : ndarray, shape (m, n), optional
         Lengths of the cylinders less `closed_length`, m, instead of `strokes`; what stroke transducers read.
     force : ndarray, shape (m, 2) or (k, 3), optional
@@ -183,7 +175,7 @@ def simulate(
     ------
     UsageError
         Rows that do not increase, values that are not finite or out of the cylinders' travel, forces above 1e7 N, dt not
-        positive; a state of another boom, or one that leaves loops open; not exactly one of strokes and lengths.
+        positive; a state of another boom; not exactly one of strokes and lengths.
     SolverError
         No equilibrium at the first row, or a step that failed; says when.
     """
@@ -209,8 +201,7 @@ def simulate(
         strokes = drives_of(compile_scene(scene), times, own.rows.lengths, own.rows.cylinder_forces)
     return Simulation(
         times, strokes, own.rows.lengths, own.rows.joints, own.rows.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
-        own.passes, abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * own.jolt,
-        by_steps, by_rows, doubts, plan.pins, own.rows.pins, own.lost, state_now(plan, own.end),
+        by_steps, by_rows, doubts, plan.pins, own.rows.pins, own.lost, own.end,
     )  # fmt: skip
 
 
@@ -221,7 +212,7 @@ def course_of(
     dt: float = 1e-3,
     angles: Array | None = None,
     rho: float = RHO,
-    start: InitialState | None = None,
+    start: State | None = None,
     name: str = "stroke",
     force: Array | None = None,
 ) -> DriveCourse:
@@ -232,12 +223,14 @@ def course_of(
     times, strokes = _checked(scene, times, strokes, dt, name)
     force = NO_FORCE if force is None else _checked_force(times, np.asarray(force, float))
     load = force_at(force, times[:1])[0]
-    plan, begin, work = (
-        rest_at(scene, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles, name=name), load)
-        if start is None
-        else started(scene, start, times, strokes, load)
-    )
-    return DriveCourse(plan, begin, work, times, strokes, rho, force)
+    if start is None:
+        plan, begin, work = rest_at(scene, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles, name=name), load)
+        return DriveCourse(plan, begin, work, times, strokes, rho, force)
+    plan, begin = compile_scene(scene), State(*(array.copy() for array in start))
+    if [array.shape for array in begin] != [array.shape for array in plan.state()]:
+        raise UsageError("start: this state is of another boom. Give the end of a simulation of the same scene.")
+    begin.contacts[:, LOST] = 0.0
+    return DriveCourse(plan, begin, plan.work(), times, strokes, rho, force)
 
 
 def _checked_force(times: Array, force: Array) -> Array:
@@ -245,13 +238,7 @@ def _checked_force(times: Array, force: Array) -> Array:
         force = np.column_stack([times, force])
     if force.ndim != 2 or force.shape[1] != 3 or not len(force):
         raise UsageError(f"force = array of shape {force.shape}: give x and y at every row of times, or rows of t_s, x, y.")
-    for row in np.flatnonzero(~(np.isfinite(force[:, 0]) & (np.abs(force[:, 1:]) <= LARGEST_FORCE).all(axis=1))):
-        at, x, y = force[row]
-        told = f"row {row + 1} of the force: t_s = {at:g}, tip_fx_N = {x:g}, tip_fy_N = {y:g}"
-        raise UsageError(f"{told}: a time must be finite, a force at most {LARGEST_FORCE:g} N. Put it right.")
-    for row in np.flatnonzero(np.diff(force[:, 0]) <= 0.0):
-        told = f"t_s = {force[row + 1, 0]:.9g} s in row {row + 2} of the force"
-        raise UsageError(f"{told}: not after row {row + 1}. Sort the rows.")
+    check_force_rows(force, "force", ("t_s", "tip_fx_N", "tip_fy_N"))
     return force
 
 
@@ -288,7 +275,7 @@ def _checked(scene: Scene, times: Array, strokes: Array, dt: float, name: str) -
     if (steps := (times[-1] - times[0]) / dt) > MOST_STEPS:
         raise UsageError(
             f"t_s = {times[-1]:g} s in row {len(times)} of the drive: {steps:.2g} steps of {dt:g} s, {MOST_STEPS:.2g} at most. "
-            "Give times in s, if these are in ms, us or ns; else a larger step, or the motion in pieces (--start)."
+            "Give times in s, if these are in ms, us or ns; else a larger step, or the motion in pieces."
         )
     most = np.array([joint.cylinder.max_stroke for joint in scene.joints])
     beyond = np.argwhere((strokes < 0.0) | (strokes > most))

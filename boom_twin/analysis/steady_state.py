@@ -1,29 +1,33 @@
-"""Steady state under a periodic load at the tip: its Fourier series through the frequency response.
+"""Steady state under a periodic load at the tip by the frequency response; swing over postures and pump rates.
 
 The load stands for `INSTANTS` even instants of a period, of a long period as many as its harmonics up to `HIGHEST_HARMONIC`
 need; every harmonic whose amplitude is above `NEGLIGIBLE` of the largest is answered by the boom linearised at rest, its mean
-by the static limit, and the answers are added up in time. Where a load goes straight from row to row its harmonics are exact
-(`polygon_series`): instants of it alone would take what is faster than half their rate for something slower.
+by the static limit, and the answers are added up in time.
+
+A pump pulse has many harmonics, so a boom swings most where one of them meets a natural frequency, not only at that frequency
+itself: with a first mode at 1.06 Hz already at 0.35 Hz, by the third harmonic.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import UsageError
+from ..scene.kinematics import strokes_of_angles
 from ..scene.pump_pulses import CHANGE_OVER, pump_pulses, upward
 from ..scene.schema import Scene
 from ..types import Array, ComplexArray
+from .equilibrium import checked_strokes
 from .frequency_response import LinearisedBoom, linearised_boom
 
 INSTANTS = 2048
 HIGHEST_HARMONIC = 200.0  # Hz; far above what moves a boom
 PERIODS = (0.01, 2000.0)  # s, shortest and longest: the model ends at some 100 Hz, and harmonics cost time
 LARGEST_FORCE = 1e7  # N; far above what any boom bears
-MOST_TERMS = 2e9  # rows times harmonics that are summed one by one, where rows are not even in time
 NEGLIGIBLE = 1e-6
 
 
@@ -58,33 +62,34 @@ def pump_load(scene: Scene, frequency: float, height: float, change_over: float 
     return PeriodicLoad(1.0 / frequency, pulses[:, None] * upward(scene.base.inclination))
 
 
+def check_force_rows(rows: Array, what: str, names: Sequence[str]) -> None:
+    """Raise UsageError unless times increase and forces are plausible; `rows` (m, 3) are time (s), x and y (N)."""
+    for row in np.flatnonzero(~(np.isfinite(rows[:, 0]) & (np.abs(rows[:, 1:]) <= LARGEST_FORCE).all(axis=1))):
+        told = ", ".join(f"{name} = {value:g}" for name, value in zip(names, rows[row], strict=True))
+        bound = f"a time must be finite, a force at most {LARGEST_FORCE:g} N"
+        raise UsageError(f"row {row + 1} of the {what}: {told}: {bound}. Put it right.")
+    for row in np.flatnonzero(np.diff(rows[:, 0]) <= 0.0):
+        told = f"t_s = {rows[row + 1, 0]:.9g} s in row {row + 2} of the {what}"
+        raise UsageError(f"{told}: not after row {row + 1}. Sort the rows.")
+
+
 def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
-    """Return a load that goes straight from row to row, with harmonics up to `HIGHEST_HARMONIC`.
+    """Return a load that goes straight from row to row.
 
     `times` (m,), s, increase; `forces` (m, 2), N. The last row ends the period with the force of the first. UsageError
     otherwise.
     """
     if len(times) < 3:
         raise UsageError("load: give at least three rows of finite numbers t_s,fx_N,fy_N, one period of the force.")
-    usable = np.isfinite(times) & (np.abs(forces) <= LARGEST_FORCE).all(axis=1)
-    if not usable.all():
-        row = int(np.flatnonzero(~usable)[0])
-        raise UsageError(
-            f"row {row + 1} of the load: t_s = {times[row]:g} s, fx_N = {forces[row, 0]:g}, fy_N = {forces[row, 1]:g}: times "
-            f"must be finite, forces at most {LARGEST_FORCE:g} N. Put it right."
-        )
-    if np.any(np.diff(times) <= 0.0):
-        row = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
-        raise UsageError(f"t_s = {times[row + 1]:g} s in row {row + 2} of the load: not after row {row + 1}. Sort the rows.")
+    check_force_rows(np.column_stack([times, forces]), "load", ("t_s", "fx_N", "fy_N"))
     if not np.allclose(forces[0], forces[-1], rtol=1e-9, atol=1e-9 * float(np.abs(forces).max())):
         raise UsageError(
             f"load: begins with ({forces[0, 0]:g}, {forces[0, 1]:g}) N and ends with ({forces[-1, 0]:g}, {forces[-1, 1]:g}) N. "
             "The last row ends the period: give it the force of the first."
         )
     period = float(times[-1] - times[0])
-    count = len(_instants(period))
-    series = polygon_series(times, forces, count // 2)
-    return PeriodicLoad(period, np.fft.irfft(count * series, count, axis=0))
+    instants = times[0] + _instants(period)
+    return PeriodicLoad(period, np.stack([np.interp(instants, times, column) for column in forces.T], axis=1))
 
 
 def _instants(period: float) -> Array:
@@ -94,32 +99,6 @@ def _instants(period: float) -> Array:
         raise UsageError(f"load: its period of {period:g} s must be {low:g} to {high:g} s. Give another rate.")
     count = 2 * max(INSTANTS // 2, math.ceil(HIGHEST_HARMONIC * period))
     return period * np.arange(count) / count
-
-
-def polygon_series(times: Array, values: Array, count: int) -> ComplexArray:
-    """Return the Fourier coefficients 0 to `count` - 1 of what goes straight from row to row and repeats, exactly.
-
-    Its second derivative is a sum of impulses, as large as its slope changes at the rows, which gives
-    c_k = sum_j ds_j e^(-i w_k t_j) / (T (i w_k)^2), w_k = 2 pi k / T. `times` (m,), s, increase, and the last ends the period;
-    `values` (m, columns) end as they begin. UsageError for rows uneven in time that are too many for so many coefficients.
-    """
-    period, rows = times[-1] - times[0], len(times) - 1
-    slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
-    changes = slopes - np.roll(slopes, 1, axis=0)
-    at, numbers = (times[:-1] - times[0]) / period, np.arange(1, count)
-    found = np.zeros((count, values.shape[1]), complex)
-    found[0] = np.trapezoid(values, times, axis=0) / period
-    if np.allclose(at * rows, np.arange(rows), rtol=0.0, atol=1e-9 * rows):
-        impulses = np.fft.fft(changes, axis=0)[numbers % rows]
-    elif rows * count <= MOST_TERMS:
-        parts = np.array_split(numbers, 1 + rows * count // 10**6)
-        impulses = np.concatenate([np.exp(-2j * math.pi * np.outer(part, at)) @ changes for part in parts])
-    else:
-        raise UsageError(
-            f"load: {rows} rows that are not even in time are too many for a period of {period:g} s. Make them even."
-        )
-    found[1:] = impulses * (period / (2j * math.pi * numbers[:, None]) ** 2)
-    return found
 
 
 @dataclass(frozen=True)
@@ -186,3 +165,69 @@ def steady_state_of(boom: LinearisedBoom, load: PeriodicLoad) -> SteadyState:
         cylinder_forces=in_time(found.cylinder_forces),
         harmonics=harmonics[1:],
     )
+
+
+TOO_MUCH = 1.5  # times the median swing of a posture: such rates are to be avoided
+LEAST_SWING = 1e-5  # m; less is no swing, but rounding or a boom without compliance
+
+
+@dataclass(frozen=True)
+class RateToAvoid:
+    """A band of rates at which one posture swings too much."""
+
+    posture: str
+    low: float  # Hz, lowest rate at which the swing is above `TOO_MUCH` times the posture's median
+    high: float  # Hz, highest such rate
+    rate: float  # Hz, of the largest swing
+    swing: float  # m, the largest
+    harmonic: int  # number of the harmonic of the load that moves the tip most there
+
+
+@dataclass(frozen=True)
+class ResonanceMap:
+    """Swing of the tip, peak to peak, over p postures and r rates."""
+
+    postures: tuple[str, ...]
+    rates: Array  # (r,), rates of the load, Hz
+    swing: Array  # (p, r), m
+    harmonics: np.ndarray  # (p, r), number of the harmonic of the load that moves the tip most
+
+    def to_avoid(self) -> tuple[RateToAvoid, ...]:
+        """The bands to avoid, posture by posture, ascending in rate."""
+        found = []
+        for name, swing, harmonics in zip(self.postures, self.swing, self.harmonics, strict=True):
+            above = np.concatenate([[False], swing > max(TOO_MUCH * float(np.median(swing)), LEAST_SWING), [False]])
+            starts, stops = np.flatnonzero(above[1:] & ~above[:-1]), np.flatnonzero(above[:-1] & ~above[1:])
+            for start, stop in zip(starts, stops, strict=True):
+                peak = start + int(np.argmax(swing[start:stop]))
+                found.append(
+                    RateToAvoid(
+                        name, float(self.rates[start]), float(self.rates[stop - 1]), float(self.rates[peak]),
+                        float(swing[peak]), int(harmonics[peak]),
+                    )
+                )  # fmt: skip
+        return tuple(found)
+
+
+def resonance_map(
+    scene: Scene, postures: Mapping[str, Array], rates: Array, load_at: Callable[[float], PeriodicLoad]
+) -> ResonanceMap:
+    """Return the swing of the tip in the steady state of every posture (joint angles, rad, by name) at every rate (Hz).
+
+    UsageError for a posture out of the cylinders' travel, SolverError for one without a stable equilibrium.
+    """
+    loads = [load_at(float(rate)) for rate in rates]
+    swing, harmonics = np.zeros((len(postures), len(rates))), np.zeros((len(postures), len(rates)), np.int64)
+    for i, (name, angles) in enumerate(postures.items()):
+        boom = LinearisedBoom(scene, _strokes(scene, name, angles), angles)
+        for j, load in enumerate(loads):
+            found = steady_state_of(boom, load)
+            swing[i, j], harmonics[i, j] = found.swing, 1 + int(np.argmax(found.harmonics))
+    return ResonanceMap(tuple(postures), np.asarray(rates, float), swing, harmonics)
+
+
+def _strokes(scene: Scene, name: str, angles: Array) -> Array:
+    try:
+        return checked_strokes(scene, strokes_of_angles(scene, angles))
+    except UsageError as error:
+        raise UsageError(f"posture {name}: {error} Leave it out, or go another way.") from None

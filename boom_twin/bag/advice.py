@@ -1,52 +1,23 @@
-"""Advice on a session: the data that a replay lacks, and the topics that can be published."""
+"""Statements on a session: what a replay lacks, names that are not those of the scene, topics that can be published."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 from ..errors import BagError
+from ..messages.sample_decoder import MOST_NAMES
 from ..messages.topic_table import Qos, Topic, Topics
 from ..types import SENSORS, Stream
 from .inspect import BagInfo, Tally
-from .joint_names import missing_drive, other_names
-from .metadata import profiles
-from .reader import Session, TopicInfo, check_topic, clocks_set_back, readable
+from .reader import Session, check_topic, read, readable
 from .session_file import CDR
 from .session_model import mapping_of
 
 SKEW = 0.05
 """Threshold (s) for a reported clock difference. A boom moves by centimetres in that time."""
-
-JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if kind.is_named)
-
-
-def names_missing(info: BagInfo, topics: Topics, joints: int) -> list[str]:
-    """Return a sentence for each channel (of `joints` joints) that is missing from some or all messages."""
-    found: list[str] = []
-    for stream, tally in _joint_states(info, topics):
-        own = [sensor.name for channel, sensor in topics.sensors_of(stream, joints).items() if not topics.lacks(channel)]
-        its = {names: count for names, count in tally.names.items() if not topics.is_shared or set(own) & set(names)}
-        has = {name: sum(count for names, count in its.items() if name in names) for name in own}
-        most = max(has.values(), default=0) or sum(its.values())  # messages, or cycles of separate messages
-        lacking = [(name, most - count) for name, count in has.items() if count < most]
-        found += [f"{name} is not in {count} of {most} messages of {tally.name}" for name, count in lacking]
-    return found
-
-
-def names_extra(info: BagInfo, topics: Topics, joints: int) -> list[str]:
-    """Return a sentence for each name in the messages that a replay does not use."""
-    used: dict[str, set[str]] = {}
-    for stream, tally in _joint_states(info, topics):
-        used.setdefault(tally.name, set()).update(_names(topics, stream, joints))
-    tallies = {tally.name: tally for _, tally in _joint_states(info, topics)}
-    return [
-        f"{name} of {topic} is not used"
-        for topic, tally in tallies.items()
-        for name in sorted({name for names in tally.names for name in names} - used[topic])
-    ]
 
 
 def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list[str]:
@@ -54,8 +25,9 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
 
     `scene` is the source of the scene, named in the sentences.
     """
-    names = {stream: [name for names in tally.names for name in names] for stream, tally in _joint_states(info, topics)}
-    found = [*missing_drive(info.session, topics), *other_names(topics, names, joints, scene)]
+    found: list[str] = []
+    with suppress(BagError):  # the loop below tells it
+        found.extend(conflicts(info.session, topics, joints, scene))
     for stream, topic in topics.inputs.items():
         if not SENSORS[stream].lack and info.session.find(topic.name) is None:
             continue
@@ -69,9 +41,7 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
             continue
         if (tally := info.tally(topic.name)) is not None:
             found += _stamps(tally)
-    lacking = names_missing(info, topics, joints)
-    remedy = "The channel stays empty there: name the driver's own names in a mapping, see topics.yaml."
-    return found + [f"{sentence}. {remedy}" for sentence in lacking]
+    return found
 
 
 def remarks(info: BagInfo, topics: Topics) -> list[str]:
@@ -81,7 +51,6 @@ def remarks(info: BagInfo, topics: Topics) -> list[str]:
         found.append("No checksums: a flipped bit cannot be noticed. Record with `boom_twin record`.")
     if info.synthetic is None:
         found.append("Its origin is not noted, so whether a rig made it is unknown. Record with --origin.")
-    found += clocks_set_back(info.session)
     inputs = topics.inputs.values()
     for topic in inputs:
         found += _passed_over(info.session, topic)
@@ -126,18 +95,6 @@ def _stamps(tally: Tally) -> Iterator[str]:
         )
 
 
-def _joint_states(info: BagInfo, topics: Topics) -> Iterator[tuple[Stream, Tally]]:
-    for stream in JOINT_STATES:
-        topic = topics.inputs.get(stream)
-        if topic is not None and (tally := info.tally(topic.name)) is not None and tally.named:
-            yield stream, tally
-
-
-def _names(topics: Topics, stream: Stream, joints: int) -> list[str]:
-    """Return the names under which the channels of a stream are published."""
-    return [sensor.name for sensor in topics.sensors_of(stream, joints).values()]
-
-
 _USUAL = Qos(reliability="reliable", durability="volatile", depth=100)
 
 
@@ -151,53 +108,113 @@ class Publishable:
 
 
 def publishable(session: Session, names: Sequence[str] | None = None) -> list[Publishable]:
-    """Return the topics with these names; without names, strokes and all inputs with messages.
+    """Return the topics with these names; without names, strokes and all inputs with messages. The mapping gives the QoS.
 
     Raise BagError if a topic is missing, is empty, or is an input of another type.
     """
     topics = mapping_of(session.path).topics
-    if names is None:
-        chosen = _inputs(session, topics)
+    if names is None:  # a name of the mapping may be relative to a namespace
+        chosen = {
+            topic.name: check_topic(session, topic.name, topic.type)
+            for stream, topic in topics.inputs.items()
+            if stream is topics.stroke_reading.stream or ((there := session.find(topic.name)) is not None and there.count)
+        }
     else:
-        found = [check_topic(session, name, _type(session, name)) for name in names]
+        found = [check_topic(session, name, getattr(session.find(name), "type", "")) for name in names]
         chosen = {topic.name: topic for topic in found}
-    return [Publishable(name, topic.type, _qos(session, topic, topics)) for name, topic in chosen.items()]
+    known = {topic.absolute: topic.qos for topic in topics.inputs.values()}
+    return [Publishable(name, topic.type, known.get(topic.name, _USUAL)) for name, topic in chosen.items()]
 
 
-def _inputs(session: Session, topics: Topics) -> dict[str, TopicInfo]:
-    """Return the input topics by their names in the mapping, which may be relative to a namespace."""
-    found: dict[str, TopicInfo] = {}
-    for stream, topic in topics.inputs.items():
-        info = session.find(topic.name)
-        if stream is topics.stroke_reading.stream or (info is not None and info.count):
-            found[topic.name] = check_topic(session, topic.name, topic.type)
-    return found
+NAMING_TIME = 5_000_000_000  # log time (ns) from the first message of strokes or angles, in which all names are read
+
+KINDS = {stream: kind.named for stream, kind in SENSORS.items() if kind.is_named and not kind.ends}
+NAMES_TOLD = 12  # limit for the number of names in a sentence
 
 
-def _type(session: Session, name: str) -> str:
-    """Return the type of a topic; empty if it is missing (`check_topic` raises the error)."""
-    info = session.find(name)
-    if info is not None and info.type.count("/") != 2:
-        raise BagError(f"{session.path}: topic {info.name} has type {info.type!r}: no message of ROS 2. Leave it out.")
-    return info.type if info else ""
+DRIVE_REMEDY = (
+    "If this boom has no stroke transducers, write `drive: angles` in a mapping (--mapping; the node: parameter mapping)."
+)
 
 
-def _qos(session: Session, topic: TopicInfo, topics: Topics) -> Qos:
-    """Return the strongest QoS offered in the metadata, or else in the channels; by default the mapping's."""
-    offered = [qos for value in _values(session, topic.name) for qos in profiles(value)]
-    if not offered:
-        known = (each for each in topics.inputs.values() if each.absolute == topic.name)
-        return next((each.qos for each in known), _USUAL)
-    return Qos(
-        reliability="reliable" if any(qos.reliability == "reliable" for qos in offered) else "best_effort",
-        durability="transient_local" if any(qos.durability == "transient_local" for qos in offered) else "volatile",
-        depth=max(qos.depth for qos in offered),
+def refuse_conflicts(session: Session, topics: Topics, joints: int, scene: str = "") -> None:
+    """Raise BagError if a session is of another boom than a scene, or lacks what drives the model; see `conflicts`."""
+    for sentence in conflicts(session, topics, joints, scene):
+        raise BagError(f"{session.path}: {sentence}")
+
+
+def conflicts(session: Session, topics: Topics, joints: int, scene: str) -> Iterator[str]:
+    """Yield an error sentence for each conflict between a session and a scene (of source `scene`) with `joints` joints.
+
+    Angles without the strokes that drive the model are a conflict. Cylinders and joints beyond the scene are a conflict. A
+    sensor that drives the model and is never named is a conflict, too: the prediction needs it. Other unknown or missing names
+    are ignored.
+    """
+    drive, strokes, angles = topics.stroke_reading.stream, topics.inputs.get(Stream.STROKES), topics.inputs[Stream.ANGLES]
+    heard = session.find(angles.name)
+    if strokes is not None and heard is not None and heard.count and not getattr(session.find(strokes.name), "count", 0):
+        yield f"no strokes ({strokes.absolute}), but {heard.count} messages of {angles.absolute}. {DRIVE_REMEDY}"
+    names = _names_read(session, topics, joints)
+    for stream, found in names.items():
+        if beyond := topics.beyond(stream, joints, found):
+            yield extra_names_message(topics.inputs[stream].absolute, beyond, stream, joints, scene)
+    named = names.get(drive, {})
+    lacking = [sensor.name for sensor in topics.sensors_of(drive, joints).values() if sensor.name not in named]
+    if named and lacking:
+        own = {sensor.name for sensor in topics.sensors_of(Stream.ANGLES, joints).values()}
+        is_alone = topics.is_shared and len(lacking) == joints and own.issubset(named)
+        yield (
+            f"{topics.inputs[drive].absolute} never names {_listed(lacking)}, but {_listed(named)}; "
+            f"{_scene(scene)} has {_counted(joints, KINDS[drive])}. Give that of this boom by --scene, or its names by "
+            "--mapping." + (f" {DRIVE_REMEDY}" if is_alone else "")
+        )
+
+
+def extra_names_message(topic: str, names: Collection[str], stream: Stream, joints: int, scene: str) -> str:
+    """Return the message, with remedy, for a topic that names cylinders or joints beyond those of the scene."""
+    kind = KINDS[stream]
+    return (
+        f"{topic} names {_listed(names)}; {_scene(scene)} has {_counted(joints, kind)}, so this is another boom. "
+        f"Give its scene by --scene (the node: parameter scene), or a mapping whose sensors list every {kind} of this one."
     )
 
 
-def _values(session: Session, name: str) -> list[Any]:
-    if session.metadata is not None:
-        entries = (entry.topic_metadata for entry in session.metadata.topics_with_message_count)
-        return [entry.offered_qos_profiles for entry in entries if entry.name == name]
-    channels = (channel for file in session.files for channel in file.channels.values() if channel.topic == name)
-    return [channel.metadata.get("offered_qos_profiles", "") for channel in channels]
+def strange_names_message(topic: str, lacking: Collection[str], strange: Collection[str]) -> str:
+    """Return the message, with remedy, for a topic that lacks names of the scene and has unknown ones."""
+    return (
+        f"{topic} names {_listed(strange)}, but not {_listed(lacking)}, which the scene has: if they are the same, correct "
+        "them at their source, or give the mapping these names"
+    )
+
+
+def _scene(source: str) -> str:
+    return f"the scene ({source})" if source else "the scene"
+
+
+def _listed(names: Iterable[str]) -> str:
+    first = list(dict.fromkeys(names))
+    return ", ".join(first[:NAMES_TOLD]) + (f" and {len(first) - NAMES_TOLD} more" if len(first) > NAMES_TOLD else "")
+
+
+def _counted(number: int, kind: str) -> str:
+    return f"{number} {kind}{'s' if number > 1 else ''}"
+
+
+def _names_read(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[str, None]]:
+    """Return the names in messages of strokes and angles, read for `NAMING_TIME` and until all driving sensors are named."""
+    heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.heard.items()}
+    present = {name: streams for name, streams in heard.items() if streams and (t := session.find(name)) and t.count}
+    if not present:
+        return {}
+    found: dict[Stream, dict[str, None]] = {stream: {} for streams in present.values() for stream in streams}
+    drive = topics.stroke_reading.stream
+    needed = {sensor.name for sensor in topics.sensors_of(drive, joints).values()}
+    first: int | None = None
+    for name, log, message in read(session, {name: topics.inputs[streams[0]].type for name, streams in present.items()}):
+        first = log if first is None else first
+        for stream in present[name]:
+            if len(found[stream]) < MOST_NAMES:
+                found[stream].update(dict.fromkeys(message.name[:MOST_NAMES]))
+        if log - first > NAMING_TIME and needed <= found.get(drive, {}).keys():
+            break
+    return found

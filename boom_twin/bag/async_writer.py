@@ -11,7 +11,7 @@ from queue import Empty, SimpleQueue
 from shutil import disk_usage
 from threading import Thread
 
-from ..diagnostics.recorder_status import DiskState
+from ..diagnostics.topic_status import DiskState
 from ..errors import BagError
 from .metadata import Recorded
 from .writer import BagWriter
@@ -79,8 +79,6 @@ STALL = 5.0  # time without an answer of the disk before it is reported, s
 PATIENCE = 30.0  # time for the disk to complete the bag at the end, s
 MOST_WAITING = 256 * 2**20  # bytes of messages that may wait in memory
 
-MOST_FILES = 2000  # limit for the number of files of one recording: readers refuse a ``metadata.yaml`` of about 3000 files
-
 _Message = tuple[int, int, bytes, int, int]
 
 
@@ -104,8 +102,7 @@ class Storage:
     """Queue of messages in front of a bag; a thread writes them, so that a slow disk does not block the caller.
 
     Messages survive this process after `FLUSH` seconds. They survive a loss of power as soon as the disk has them. `tell`
-    receives a sentence when the disk does not answer, when it answers again, and when no further file begins. Only this object
-    may use `bag` from now on.
+    receives a sentence when the disk does not answer, and when it answers again. Only this object may use `bag` from now on.
     """
 
     def __init__(self, bag: BagWriter, split: FileSplit, tell: Callable[[str], None]) -> None:
@@ -116,7 +113,7 @@ class Storage:
         self._syncer = Syncer()
         bag.sync = lambda file: self._syncer.put(file, self._taken)
         self._free = self._written = 0
-        self._is_late = self._is_last = False
+        self._is_late = False
         self._error: BaseException | None = None
         self._topics = 0
         self._thread = Thread(target=self._run, name="storage", daemon=True)
@@ -227,16 +224,7 @@ class Storage:
 
     def _write(self, message: _Message) -> None:
         key, log_time, data, publish_time, sequence = message
-        if self._split.is_due(self._bag, log_time) and not self._is_in_last_file():
+        if self._split.is_due(self._bag, log_time):
             self._bag.split()
         self._bag.write(key, log_time, data, publish_time, sequence)
         self._taken += len(data)
-
-    def _is_in_last_file(self) -> bool:
-        """Return True if the open file is the last of `MOST_FILES`; report that once."""
-        if self._bag.completed + 1 < MOST_FILES:
-            return False
-        if not self._is_last:
-            self._tell(f"{self._bag.file}: is the last file of {MOST_FILES}, and goes on to the end. Split less often.")
-        self._is_last = True
-        return True

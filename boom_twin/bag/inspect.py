@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import struct
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
 
-from ..messages.cdr_decoder import has_header, names_in, stamp_in
-from ..messages.topic_table import TYPES
+from ..messages.cdr_decoder import has_header, stamp_in
 from ..messages.type_store import jazzy
-from ..types import NANO, Stream
+from ..types import NANO
 from .reader import Session, scan
-from .session_file import CDR, SessionFile, as_bag_error, schema_of
-from .time_window import WHOLE, TimeWindow
-
-VARIANTS = 100  # largest number of different name lists counted in one topic
+from .session_file import CDR, WHOLE, SessionFile, TimeWindow, as_bag_error, schema_of
 
 
 class Skew(NamedTuple):
@@ -37,8 +32,7 @@ class Tally:
 
     name: str
     type: str
-    stamped: bool  # stamped, named: messages have a header; they are joint states
-    named: bool
+    stamped: bool  # messages have a header
     count: int = 0
     first: int = 0  # first, last: log times, ns
     last: int = 0
@@ -46,11 +40,9 @@ class Tally:
     gap_after: int = 0
     not_increasing: int = 0  # number of messages whose stamp is not after that of the message before
     unset: int = 0  # number of messages with a stamp of 0 or too short for a stamp
-    names: Counter[tuple[str, ...]] = field(default_factory=Counter)  # number of messages by their joint names
     _skewed: int = 0  # messages whose log time is compared with their stamp
     _skews: tuple[int, int, int] = (2**64, 0, -(2**64))  # least, sum and largest of log time minus stamp, ns
     _before: int | None = None
-    _known: tuple[bytes, tuple[str, ...]] | None = None
 
     def add(self, log_time: int, data: bytes) -> None:
         """Add one message to the statistics."""
@@ -67,8 +59,6 @@ class Tally:
                 self.unset += 1
         if stamp:
             self._step(stamp, before_this)
-        if self.named:
-            self._read_names(data)
 
     @property
     def rate(self) -> float | None:
@@ -93,21 +83,6 @@ class Tally:
         least, total, most = self._skews
         self._skews = min(least, skew), total + skew, max(most, skew)
         self._skewed += 1
-
-    def _read_names(self, data: bytes) -> None:
-        """Count the joint names of a message. Unchanged bytes are not decoded again."""
-        if self._known is None or not data.startswith(self._known[0], 12):
-            try:
-                names, end = names_in(data)
-            except (ValueError, KeyError, struct.error):
-                return  # not a whole joint state
-            self._known = data[12:end], names
-        names = self._known[1]
-        if names in self.names or len(self.names) < VARIANTS:
-            self.names[names] += 1
-
-
-_NAMED = TYPES[Stream.STROKES]
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +122,7 @@ def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
     The window counts from the first message of the session. Raise BagError if there is no session, or it is damaged.
     """
     session = scan(path)
-    tallies = {topic.name: Tally(topic.name, topic.type, False, _NAMED in topic.type) for topic in session.topics}
+    tallies = {topic.name: Tally(topic.name, topic.type, False) for topic in session.topics}
     files = sorted(session.files, key=attrgetter("start"))
     for file in files:
         _count(file, tallies, window.bounds(session.start))
@@ -160,12 +135,12 @@ def _count(file: SessionFile, tallies: dict[str, Tally], bounds: tuple[int, int]
     own = {key: tallies[channel.topic] for key, channel in file.channels.items()}
     passed_over = set()
     for key, channel in file.channels.items():
-        kind, tally = file.type_of(channel), own[key]
-        if channel.message_encoding != CDR or (tally.named and kind != _NAMED):
+        kind = file.type_of(channel)
+        if channel.message_encoding != CDR:
             passed_over.add(key)
         else:
             schema = schema_of(key, kind) if kind in jazzy().types else file.schemas.get(channel.schema_id)
-            tally.stamped = schema is not None and has_header(schema)
+            own[key].stamped = schema is not None and has_header(schema)
     seen: Counter[int] = Counter()
     with as_bag_error(file.path):
         for key, log_time, data in file.heads():

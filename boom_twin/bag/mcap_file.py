@@ -21,9 +21,8 @@ from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 
 from ..errors import BagError
-from ..messages.message_block import Integers, MessageBlock, by_log_time, gather, joined
+from ..messages.cdr_decoder import MessageBlock, by_log_time, gather, joined
 from ..system.received_files import open_received
-from .log_clock import NEVER_SET_BACK, LogClock, Piece
 from .mcap_records import (
     LARGEST_SUMMARY,
     MESSAGE_HEAD,
@@ -36,7 +35,7 @@ from .mcap_records import (
     record_of,
     unpack,
 )
-from .session_file import PARSE_ERRORS, SessionFile, as_bag_error
+from .session_file import SessionFile, as_bag_error
 
 PROFILE = "ros2"
 NOTES = "boom_twin"  # name of the metadata record that holds the notes on a session
@@ -48,7 +47,6 @@ _LENGTH = 8  # size of the length field right before the body of a record, bytes
 _HEAD = np.dtype([("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
 """`MESSAGE_HEAD` behind the length of its record."""
 _MESSAGE = int(Opcode.MESSAGE)
-_PIECE = 2**31  # offset between the places of messages of two pieces: more than the bytes of a piece
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,44 +64,19 @@ class McapFile(SessionFile):
                 for row, (channel, time) in enumerate(zip(block.sources.tolist(), block.log_times.tolist(), strict=True)):
                     yield channel, time, block.data(row)
 
-    def log_clock(self) -> LogClock:
-        """Return the clock of the recorder, see `SessionFile`.
-
-        It was not set back before a chunk that begins after the end of the one before. Messages are then read in the last
-        chunk only. Damage is reported by whoever reads the messages.
-        """
-        ordered = all(one.message_end_time <= other.message_start_time for one, other in pairwise(self.pieces))
-        first = len(self.pieces) - 1 if ordered else 0
-        try:
-            return LogClock.of(lambda: self._log_times(first)) if self.pieces else NEVER_SET_BACK
-        except PARSE_ERRORS:
-            return NEVER_SET_BACK
-
-    def _log_times(self, first: int) -> Iterator[Piece]:
-        """Yield places, channels and log times of all messages from the piece with number `first` on."""
-        with open_received(self.path) as file:
-            for number in range(first, len(self.pieces)):
-                block = _messages(_content(file, self.pieces[number]))
-                yield _places(block, number), block.sources, block.log_times
-
-    def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
+    def blocks(self, passed: Set[int]) -> Iterator[MessageBlock]:
         """Yield blocks as in `SessionFile`, one piece after the other. Messages of equal time keep the order of the file.
 
         Only pieces that overlap in time are held together.
         """
         held: dict[int, MessageBlock] = {}
-        pieces = list(enumerate(self.pieces))
-        if not clock.is_set_back:
-            pieces.sort(key=lambda each: each[1].message_start_time)
+        pieces = sorted(enumerate(self.pieces), key=lambda each: each[1].message_start_time)
         chosen = (each for each in pieces if not each[1].message_index_offsets or each[1].message_index_offsets.keys() - passed)
         with open_received(self.path) as file:
             for (number, piece), (_, after) in pairwise([*chosen, (0, None)]):
                 assert piece is not None
                 block = _messages(_content(file, piece))
                 block = block.chosen(np.flatnonzero(~np.isin(block.sources, list(passed))))
-                if clock.is_set_back:
-                    yield clock.corrected(block, _places(block, number))
-                    continue
                 held[number] = by_log_time(block)
                 if sum(len(each.content) for each in held.values()) > MOST_HELD or sum(map(len, held.values())) > MOST_TOGETHER:
                     what = f"more than {MOST_HELD} bytes or {MOST_TOGETHER} messages are out of order"
@@ -279,8 +252,3 @@ def _messages(content: bytes) -> MessageBlock:
     heads = gather(content, starts - _LENGTH, _HEAD.itemsize).view(_HEAD)[:, 0]
     channels, ends = heads["channel"].astype(np.int64), starts + heads["length"].astype(np.int64)
     return MessageBlock(content, channels, heads["log_time"].copy(), starts + MESSAGE_HEAD.size, ends)
-
-
-def _places(block: MessageBlock, number: int) -> Integers:
-    """Return the places of the messages of the piece with this number in the order of the file."""
-    return _PIECE * number + block.starts - MESSAGE_HEAD.size - PREFIX.size

@@ -8,11 +8,10 @@ from __future__ import annotations
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import BinaryIO
 
 import numpy as np
-from lz4.frame import compress as lz4_compress
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -29,15 +28,14 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
-from mcap.writer import MCAP0_MAGIC, CompressionType
+from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdCompressor
 
-from ..messages.encoded_block import Bytes, EncodedBlock
+from ..messages.cdr_encoder import Bytes, EncodedBlock
 from ..twin.blocks import Integers
 from .mcap_records import MESSAGE_HEAD, PREFIX
 
-Pack = Callable[[bytearray], bytes]
-
+COMPRESSION = "zstd"
 _INDEX_HEAD = struct.Struct("<HI")  # index of one channel in one chunk: channel, bytes of entries
 _INDEX_ENTRY = struct.Struct("<QQ")  # log time (ns), place in the chunk
 _HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")  # array type of `PREFIX` and `MESSAGE_HEAD`
@@ -50,9 +48,8 @@ class McapWriter:
     records. Every method raises the OSErrors of the stream.
     """
 
-    def __init__(self, stream: BinaryIO, profile: str, library: str, chunk_size: int, compression: CompressionType) -> None:
+    def __init__(self, stream: BinaryIO, profile: str, library: str, chunk_size: int) -> None:
         self._stream, self._chunk_size = stream, chunk_size
-        self._compression, self._pack = _codec(compression)
         self._chunk = _OpenChunk()
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
@@ -158,11 +155,11 @@ class McapWriter:
         if not self._chunk.entries:
             return
         chunk, self._chunk = self._chunk, _OpenChunk()
-        packed, start = self._pack(chunk.content), self._stream.tell()
+        packed, start = ZstdCompressor().compress(chunk.content), self._stream.tell()
         written = bytearray(
             _encoded(
                 Chunk(
-                    compression=self._compression,
+                    compression=COMPRESSION,
                     data=packed,
                     message_start_time=chunk.start,
                     message_end_time=chunk.end,
@@ -189,7 +186,7 @@ class McapWriter:
                 chunk_length=length,
                 message_index_offsets=offsets,
                 message_index_length=len(written) - length,
-                compression=self._compression,
+                compression=COMPRESSION,
                 compressed_size=len(packed),
                 uncompressed_size=len(chunk.content),
             )
@@ -250,10 +247,3 @@ def _encoded(*records: McapRecord) -> bytes:
     for record in records:
         record.write(builder)
     return bytes(builder.end())  # type: ignore[no-untyped-call]
-
-
-def _codec(compression: CompressionType) -> tuple[str, Pack]:
-    """Return name and function of a compression, at the default level of its library."""
-    if compression is CompressionType.ZSTD:
-        return "zstd", ZstdCompressor().compress
-    return ("lz4", lz4_compress) if compression is CompressionType.LZ4 else ("", bytes)

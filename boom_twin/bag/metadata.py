@@ -27,18 +27,6 @@ _ROOT = "rosbag2_bagfile_information"
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
 
-class Start(BaseModel):
-    """A point in time."""
-
-    nanoseconds_since_epoch: int = 0
-
-
-class Duration(BaseModel):
-    """A span of time."""
-
-    nanoseconds: int = 0
-
-
 class TopicMetadata(BaseModel):
     """One topic of the bag."""
 
@@ -56,28 +44,19 @@ class TopicCount(BaseModel):
     message_count: int
 
 
-class FileInformation(BaseModel):
-    """One file of the bag."""
-
-    path: str
-    starting_time: Start
-    duration: Duration
-    message_count: int
-
-
 class BagMetadata(BaseModel):
     """Content of ``metadata.yaml``. Keys missing in older versions have defaults; keys added by newer ones are ignored."""
 
     version: int
     storage_identifier: str
-    duration: Duration
-    starting_time: Start
+    duration: Any = None
+    starting_time: Any = None
     message_count: int
     topics_with_message_count: list[TopicCount]
     compression_format: str = ""
     compression_mode: str = ""
     relative_file_paths: list[str] = Field(min_length=1)
-    files: list[FileInformation] = []
+    files: Any = []
     custom_data: dict[str, Any] | None = None
     ros_distro: str = ""
 
@@ -179,38 +158,14 @@ def offered_qos(qos: Qos) -> list[dict[str, Any]]:
     ]
 
 
-DEEPEST = 10_000  # limit for the depth of a QoS profile that is read
-
-_RELIABILITY = {1: "reliable", 2: "best_effort", "reliable": "reliable", "best_effort": "best_effort"}
-_DURABILITY = {1: "transient_local", 2: "volatile", "transient_local": "transient_local", "volatile": "volatile"}
-_LONGEST = 100_000  # characters of YAML in one entry
-
-
-def profiles(value: Any) -> list[Qos]:
-    """Return the QoS profiles of one topic as in ``topics.yaml``. A profile that cannot be read is left out.
-
-    `value` is ``offered_qos_profiles`` of ``metadata.yaml`` or of a channel: a list, or YAML of one.
-    """
-    if isinstance(value, str):
-        try:
-            value = plain(value) if len(value) <= _LONGEST else []
-        except ValueError:
-            return []
-    found = [_profile(entry) for entry in (value if isinstance(value, list) else []) if isinstance(entry, dict)]
-    return [qos for qos in found if qos is not None]
-
-
-def _profile(entry: dict[Any, Any]) -> Qos | None:
+def kept_qos(value: Any) -> list[dict[Any, Any]]:
+    """Return the offered profiles of ``metadata.yaml`` or of a channel, none if not in the format of version 9."""
     try:
-        return Qos.model_validate(
-            {
-                "reliability": _RELIABILITY.get(entry.get("reliability"), "reliable"),
-                "durability": _DURABILITY.get(entry.get("durability"), "volatile"),
-                "depth": min(max(int(entry.get("depth") or 1), 1), DEEPEST),
-            }
-        )
-    except (ValidationError, TypeError, ValueError):
-        return None
+        found = plain(value) if isinstance(value, str) else value
+    except ValueError:
+        return []
+    entries = [entry for entry in found if isinstance(entry, dict)] if isinstance(found, list) else []
+    return [entry for entry in entries if isinstance(entry.get("reliability"), str)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,34 +204,41 @@ def _profile_text(qos: Qos) -> str:
     return dump(offered_qos(qos))
 
 
-def file_information(path: str, first: int, last: int, count: int) -> FileInformation:
-    """Return the entry of one file from its name, first and last log time (ns) and number of messages."""
-    start, duration = Start(nanoseconds_since_epoch=first), Duration(nanoseconds=last - first)
-    return FileInformation(path=path, starting_time=start, duration=duration, message_count=count)
+@dataclass(frozen=True, slots=True)
+class WrittenFile:
+    """Complete file of a bag: name, first and last log time (ns; 0 without messages) and number of messages."""
+
+    name: str
+    first: int
+    last: int
+    count: int
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """Entry of the file in ``metadata.yaml``."""
+        return {"path": self.name, **_span(self.first, self.last), "message_count": self.count}
+
+
+def _span(first: int, last: int) -> dict[str, Any]:
+    return {"starting_time": {"nanoseconds_since_epoch": first}, "duration": {"nanoseconds": last - first}}
 
 
 def metadata_of(
-    files: Sequence[FileInformation],
-    topics: Sequence[Recorded],
-    counts: Mapping[int, int],
-    notes: Mapping[str, str],
-    distro: str,
+    files: Sequence[WrittenFile], topics: Sequence[Recorded], counts: Mapping[int, int], notes: Mapping[str, str], distro: str
 ) -> BagMetadata:
     """Return the metadata of a whole bag. `counts` are messages by index in `topics`."""
-    filled = [file for file in files if file.message_count]
-    first = min((file.starting_time.nanoseconds_since_epoch for file in filled), default=0)
-    last = max((file.starting_time.nanoseconds_since_epoch + file.duration.nanoseconds for file in filled), default=0)
+    filled = [file for file in files if file.count]
+    first, last = min((file.first for file in filled), default=0), max((file.last for file in filled), default=0)
     return BagMetadata(
         version=VERSION,
         storage_identifier="mcap",
-        duration=Duration(nanoseconds=last - first),
-        starting_time=Start(nanoseconds_since_epoch=first),
-        message_count=sum(file.message_count for file in files),
+        **_span(first, last),
+        message_count=sum(file.count for file in files),
         topics_with_message_count=[
             TopicCount(topic_metadata=topic.metadata, message_count=counts[key]) for key, topic in enumerate(topics)
         ],
-        relative_file_paths=[file.path for file in files],
-        files=list(files),
+        relative_file_paths=[file.name for file in files],
+        files=[file.metadata for file in files],
         custom_data=dict(notes) or None,
         ros_distro=distro,
     )

@@ -1,6 +1,6 @@
 """Read a recorded session: its files, its content, and its decoded messages in the order of log times.
 
-A session is a rosbag2 directory, a directory of its files without ``metadata.yaml``, or a file of `boom_twin.bag.storages`.
+A session is a rosbag2 directory, a directory of its files without ``metadata.yaml``, or one file with a suffix of `SUMMARISE`.
 """
 
 from __future__ import annotations
@@ -21,13 +21,34 @@ from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 from ..errors import BagError
 from ..messages.type_store import other_than_jazzy
 from ..system.received_files import holds_file, sha256_of
-from ..types import NANO
+from . import csv_file, mcap_file, other_storages
 from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata, refuse_packed
-from .session_blocks import SessionBlocks
-from .session_file import CDR, SessionFile, as_bag_error, compare_counts
-from .session_sheet import incompleteness, kept_origin
-from .storages import summarise
-from .time_window import WHOLE, TimeWindow
+from .session_file import CDR, WHOLE, SessionBlocks, SessionFile, TimeWindow, compare_counts
+from .session_model import incompleteness, kept_origin
+
+SUMMARISE: dict[str, Callable[[Path], SessionFile]] = {
+    ".mcap": mcap_file.summarise,
+    ".db3": other_storages.summarise_sqlite,
+    ".bag": other_storages.summarise_ros1,
+    ".csv": csv_file.summarise,
+}
+"""Function for each suffix. Files of rosbag2 may lie in a folder, see `STORAGES`; any other file is a session by itself."""
+
+
+def summarise(path: Path) -> SessionFile:
+    """Return the content of one file. A file with an unknown suffix is read as .mcap.
+
+    Raise BagError if the file is missing, of another kind, cut off or damaged.
+    """
+    refuse_packed(path)
+    return SUMMARISE.get(path.suffix.lower(), SUMMARISE[".mcap"])(path)
+
+
+def is_session(path: Path) -> bool:
+    """Return True if the names of the files at `path` are those of a session."""
+    if path.is_dir():
+        return any(file.suffix in STORAGES for file in path.iterdir())
+    return path.suffix.lower() in SUMMARISE
 
 
 def refuse_absent(path: Path) -> None:
@@ -53,15 +74,6 @@ def stored_files(path: Path, storage: str = "") -> list[Path]:
         wanted = " or ".join(sorted(kinds, reverse=True))
         raise BagError(f"{path}: no {wanted} file and no {FILE_NAME} in it (there is: {there}). Give a rosbag2 directory.")
     return files
-
-
-def check_listed(path: Path, named: list[Path]) -> None:
-    """Raise BagError for a file that the metadata does not name: its recorder was killed."""
-    if unlisted := sorted(file.name for file in path.iterdir() if file.suffix in STORAGES and file not in named):
-        raise BagError(
-            f"{path}: {FILE_NAME} does not name {', '.join(unlisted)}: the recorder was ended by force. "
-            "`boom_twin recover BAG --out DIR` saves all of it; or move the file away."
-        )
 
 
 def sources(path: Path) -> tuple[list[Path], BagMetadata | None]:
@@ -157,21 +169,6 @@ class Session:
         return next((topic for topic in self.topics if topic.name.lstrip("/") == name.lstrip("/")), None)
 
 
-def clocks_set_back(session: Session) -> list[str]:
-    """Return a sentence for every file in which the recorder's clock was set back."""
-    found = []
-    for file in session.files:
-        with as_bag_error(file.path):
-            clock = file.log_clock()
-        if clock.is_set_back:
-            times = f"{len(clock.places)} time{'s' if len(clock.places) > 1 else ''}, by {clock.total * NANO:.3f} s in all"
-            found.append(
-                f"{file.path.name}: log times step back {times}: the recorder's clock was set back. "
-                "Messages are read in the order of the file, as they came."
-            )
-    return found
-
-
 def files_sha256(session: Session) -> str:
     """Return the SHA-256 over the SHA-256 digests of the files of a session, in their order."""
     return sha256(b"".join(bytes.fromhex(sha256_of(file.path)) for file in session.files)).hexdigest()
@@ -195,8 +192,12 @@ def _scan(path: Path, incomplete: str) -> Session:
     metadata = read_metadata(path / FILE_NAME) if holds_file(path / FILE_NAME) else None
     named = [path / name for name in metadata.file_names] if metadata else stored_files(path)
     files = tuple(summarise(file) for file in named)
-    if metadata is not None:
-        check_listed(path, named)
+    there = path.iterdir() if metadata else ()
+    if unlisted := sorted(file.name for file in there if file.suffix in STORAGES and file not in named):
+        raise BagError(
+            f"{path}: {FILE_NAME} does not name {', '.join(unlisted)}: the recorder was ended by force. "
+            "`boom_twin recover BAG --out DIR` saves all of it; or move the file away."
+        )
     topics = _topics(files)
     notes = {key: value for file in files for key, value in file.notes.items()}
     if metadata is not None:

@@ -1,15 +1,16 @@
-"""One file of a session in any storage: its content, its messages as CDR, and one kind of error for any damage."""
+"""Files of a session in any storage, their messages as CDR in the order of log times, and one error for any damage."""
 
 from __future__ import annotations
 
 import struct
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from mcap.exceptions import McapError
@@ -18,9 +19,63 @@ from rosbags.serde import SerdeError
 from zstandard import ZstdError
 
 from ..errors import BagError
-from ..messages.message_block import MessageBlock
-from ..messages.type_store import jazzy
-from .log_clock import NEVER_SET_BACK, LogClock
+from ..messages.cdr_decoder import MessageBlock, by_log_time, joined
+from ..messages.type_store import decode, jazzy
+from ..types import NANO
+
+NEVER = 2**64 - 1  # log time after all others, ns
+
+
+@dataclass(frozen=True, slots=True)
+class TimeWindow:
+    """A part of a session, by the log times of its messages.
+
+    Attributes
+    ----------
+    start : float
+        Time after the first message of the topics that are read, s.
+    duration : float or None
+        Length, s; None is to the end of the session.
+    """
+
+    start: float = 0.0
+    duration: float | None = None
+
+    def share(self, length: float) -> float:
+        """Return the share of a session of `length` (s) that lies in the window, 0 to 1."""
+        left = max(0.0, length - self.start)
+        return min(left, left if self.duration is None else self.duration) / length if length > 0.0 else 1.0
+
+    def cut(self, blocks: Iterable[MessageBlock], path: Path) -> Iterator[MessageBlock]:
+        """Yield the messages inside the window. Blocks after its end are not read.
+
+        Raise BagError if no message is in the window.
+        """
+        first: int | None = None
+        is_empty, newest = True, 0.0
+        for block in blocks:
+            first = int(block.log_times[0]) if first is None else first
+            newest = (int(block.log_times[-1]) - first) * NANO
+            begin, end = np.searchsorted(block.log_times, np.array(self.bounds(first), np.uint64))
+            if begin < end:
+                is_empty = False
+                yield block.chosen(slice(int(begin), int(end)))
+            if end < len(block):
+                break
+        if is_empty:
+            told = "" if self.duration is None else f" to {self.start + self.duration:g} s"
+            raise BagError(
+                f"{path}: no message from {self.start:g} s{told} on; the session lasts {newest:.1f} s. Begin earlier."
+            )
+
+    def bounds(self, first: int) -> tuple[int, int]:
+        """Return the first log time (ns) in the window and the first one after it, for a session that begins at `first`."""
+        begin = min(NEVER, first + round(self.start / NANO))
+        return begin, NEVER if self.duration is None else min(NEVER, begin + round(self.duration / NANO))
+
+
+WHOLE = TimeWindow()  # window of the whole session
+
 
 TOGETHER = 2000  # messages in one block of a file that is read message by message
 CDR = "cdr"
@@ -92,15 +147,10 @@ class SessionFile(ABC):
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield channel, log time (ns) and encoded data of all messages."""
 
-    def log_clock(self) -> LogClock:
-        """Return the clock of the recorder. The default is for a storage whose only order is that of log times."""
-        return NEVER_SET_BACK
+    def blocks(self, passed: Set[int]) -> Iterator[MessageBlock]:
+        """Yield blocks of all messages, except of the `passed` channels, in the order of log times.
 
-    def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
-        """Yield blocks of all messages, except of the `passed` channels, in the order in which the node took them.
-
-        The sources of a block are channels. The order is that of log times, or that of the file if its `clock` was set
-        back; log times are then corrected. This default requires `heads` in that order.
+        The sources of a block are channels. This default requires `heads` in that order.
         """
         found = (each for each in self.heads() if each[0] not in passed)
         while group := list(islice(found, TOGETHER)):
@@ -120,3 +170,95 @@ def schema_of(number: int, type_name: str, definition: str = "") -> Schema:
 def channel_of(number: int, topic: str, encoding: str = CDR) -> Channel:
     """Return a channel whose schema has the number of the channel."""
     return Channel(id=number, topic=topic, message_encoding=encoding, schema_id=number, metadata={})
+
+
+class Source(NamedTuple):
+    """Source of messages: a file, a topic in it, the `name` by which the topic was requested, and its type."""
+
+    file: Path
+    topic: str
+    name: str
+    type: str
+
+
+class SessionBlocks:
+    """Iterable over blocks of the messages of some topics, sorted by log time, then by file.
+
+    Parameters
+    ----------
+    files : sequence of (SessionFile, set of int)
+        Files, each with the channels to read.
+    asked : mapping of str to str
+        Name by which each topic is requested, by its name in the files.
+    window : TimeWindow
+        Time window; messages outside it are left out.
+
+    Raises
+    ------
+    BagError
+        While iterating: a checksum does not fit, or no message is in the window; at the end: the files did not hold what their
+        statistics say.
+    """
+
+    def __init__(self, files: Sequence[tuple[SessionFile, set[int]]], asked: Mapping[str, str], window: TimeWindow) -> None:
+        self.sources: list[Source] = []  # source for each source number of the blocks
+        self._window = window
+        self._files = [(file, self._numbers(file, channels, asked)) for file, channels in files]
+
+    def _numbers(self, file: SessionFile, channels: set[int], asked: Mapping[str, str]) -> dict[int, int]:
+        """Return the index in `sources` by channel; -1 for a channel that was not requested."""
+        numbers = dict.fromkeys(file.channels, -1)
+        for channel in file.channels.values():
+            if channel.id in channels:
+                numbers[channel.id] = len(self.sources)
+                self.sources.append(Source(file.path, channel.topic, asked[channel.topic], file.type_of(channel)))
+        return numbers
+
+    def __iter__(self) -> Iterator[MessageBlock]:
+        blocks = _merged([_wanted(file, numbers) for file, numbers in self._files])
+        return blocks if self._window == WHOLE else self._window.cut(blocks, self._files[0][0].path)
+
+    def decoded(self, block: MessageBlock, row: int) -> Any:
+        """Return one decoded message; None for a type unknown to Jazzy. Raise BagError if it cannot be decoded."""
+        source = self.sources[block.sources[row]]
+        try:
+            return decode(block.data(row), source.type) if source.type in jazzy().types else None
+        except PARSE_ERRORS as error:
+            place = f"{source.file}: topic {source.topic} at log time {block.log_times[row]} ns"
+            raise BagError(f"{place}: {error} {REMEDY}") from error
+
+
+def _wanted(file: SessionFile, numbers: Mapping[int, int]) -> Iterator[MessageBlock]:
+    """Yield blocks of the requested channels of one file (number 0 or more)."""
+    seen: Counter[int] = Counter()
+    passed = {channel for channel, number in numbers.items() if number < 0}
+    with as_bag_error(file.path):
+        for block in file.blocks(passed):
+            seen.update(block.sources.tolist())
+            unknown = ~np.isin(block.sources, list(numbers))
+            end = int(unknown.argmax()) if unknown.any() else len(block)
+            if end:
+                known = block.chosen(slice(0, end))
+                sources = np.array([numbers[channel] for channel in known.sources.tolist()])
+                yield replace(known, sources=sources)
+            if end < len(block):
+                raise KeyError(int(block.sources[end]))
+        told = {channel: count for channel, count in file.counts.items() if channel not in passed}
+        file.check_counts("statistics", told, "read", seen)
+
+
+def _merged(files: Sequence[Iterator[MessageBlock]]) -> Iterator[MessageBlock]:
+    """Yield blocks of the messages of all files, sorted by log time, then by file."""
+    filling = [(block for block in file if len(block)) for file in files]
+    waiting = [next(file, None) for file in filling]
+    while filled := [(number, block) for number, block in enumerate(waiting) if block is not None]:
+        last, first = min((block.log_times[-1], number) for number, block in filled)
+        due = []
+        for number, block in filled:
+            if block.log_times[0] <= last:
+                side: Literal["left", "right"] = "right" if number <= first else "left"
+                end = int(np.searchsorted(block.log_times, last, side))
+                due.append(block.chosen(slice(0, end)))
+                waiting[number] = block.chosen(slice(end, None))
+        yield by_log_time(joined([block for block in due if len(block)]))
+        waiting[first] = next(filling[first], None)

@@ -1,4 +1,4 @@
-"""Choose scene, settings and mapping of a session: a given file, else the session's, else the package's.
+"""Session metadata in ``session.yaml``, and the choice of scene, settings and mapping: given, the session's, or the package's.
 
 An invalid given file raises UsageError (a scene: SceneError). An invalid text of the session raises BagError, with the
 option that gives another.
@@ -6,20 +6,193 @@ option that gives another.
 
 from __future__ import annotations
 
+import hashlib
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
+
+from ruamel.yaml.scalarstring import DoubleQuotedScalarString, LiteralScalarString
 
 from ..config.settings import Settings, checked, load_settings
-from ..config.yaml_text import plain
+from ..config.yaml_text import LARGEST_FILE, plain, read_plain
 from ..errors import BagError, Fault, SceneError, UsageError
 from ..messages.mapping import load_mapping, mapping_from
 from ..messages.topic_table import Topics
 from ..scene.edit import anew
 from ..scene.load import DEFAULT_NAME, SceneSource, as_scene, default_text, examine_text, read_text
 from ..scene.schema import Scene
+from ..system.atomic_files import write_atomic
+from ..system.received_files import holds_file
+from ..system.result_folder import UNFINISHED, is_unfinished
 from ..types import Stream, StrokeReading
-from .session_sheet import KeptText, kept, kept_parameters, rig_version, sha256
+from .metadata import dump
+
+FILE_NAME = "session.yaml"
+RIG_ORIGIN = "synthetic session of a virtual rig (Exudyn), surrogate parameters"
+_HEAD = "# What this session was made with. scene_sha256 is of the text under scene (UTF-8).\n"
+
+
+@dataclass(frozen=True, slots=True)
+class SessionSheet:
+    """Metadata of a session: version, scene, settings and mapping. A field that is None or empty is left out of the file."""
+
+    version: str
+    # scene, parameters, mapping: text of the scene file, of the ROS parameter file, and of the file that names topics and
+    # sensors
+    scene: str | None = None
+    parameters: str | None = None
+    mapping: str | None = None
+    # type by topic to be recorded; None for a type unknown at the start
+    topics: Mapping[str, str | None] = field(default_factory=dict)
+    note: str | None = None  # note, origin: note of the operator, and origin of the session
+    origin: str | None = None
+    twin: Mapping[str, object] = field(default_factory=dict)  # parameters of the running twin; empty without a twin
+    started: datetime | None = None  # start of the recording; None for a synthetic session
+    strokes: StrokeReading | None = None  # quantity that the stroke transducers read; None if unknown
+
+    def write(self, directory: Path, counts: Sequence[Mapping[str, str | int | None]] | None = None) -> None:
+        """Write ``session.yaml`` beside the bag, all of it or nothing.
+
+        `counts` are given at the end: each topic with what became of its messages; None is unknown. A recording that was
+        killed has none. Raise BagError if the disk is full or fails, or the file would be larger than what is read again.
+        """
+        end = {} if counts is None else {"ended": _time(datetime.now(UTC)), "counts": [dict(each) for each in counts]}
+        document = {
+            "boom_twin": self.version,
+            "started": self.started and _time(self.started),
+            **end,
+            "origin": self.origin,
+            "note": self.note,
+            "strokes": self.strokes and self.strokes.value,
+            "topics": dict(self.topics),
+            "twin": dict(self.twin),
+            "scene_sha256": sha256(self.scene) if self.scene else None,
+            "scene": _block(self.scene),
+            "parameters": _block(self.parameters),
+            "mapping": _block(self.mapping),
+        }
+        text = _HEAD + dump({key: value for key, value in document.items() if value not in (None, "", {})})
+        path = directory / FILE_NAME
+        if (size := len(text.encode())) > LARGEST_FILE:
+            raise BagError(f"{path}: {size} bytes, of which {LARGEST_FILE} are read again. Shorten scene and mapping.")
+        write_atomic(path, text)
+
+
+@dataclass(frozen=True, slots=True)
+class KeptText:
+    """A text of a ``session.yaml``, and a description of its place."""
+
+    text: str
+    source: str
+
+
+def sheet_path(session: Path) -> Path:
+    """Return the path of the ``session.yaml`` of a session: in its directory, or beside its single file."""
+    return (session if session.is_dir() else session.parent) / FILE_NAME
+
+
+def kept(session: Path, key: str, option: str) -> KeptText | None:
+    """Return the text that a session keeps under `key`; None without one. The text is untrusted input.
+
+    `key` is one of ``session.yaml``: scene, parameters, mapping, .. The error names the `option` by which a user gives another
+    text. Raise BagError if ``session.yaml`` cannot be read, or holds something else there.
+    """
+    path, remedy = sheet_path(session), f"Move it away, or give the {key} by {option}."
+    text = _value(path, key, remedy)
+    if not isinstance(text, str | None):
+        raise BagError(f"{path}, {key}: not a text, as `boom_twin record` writes it. {remedy}")
+    return KeptText(text, f"{path}, {key}") if text else None
+
+
+def kept_parameters(session: Path) -> tuple[dict[str, Any], str]:
+    """Return the parameters of the twin that ran beside a recording, and a description of their place; empty without a twin.
+
+    Raise BagError if ``session.yaml`` cannot be read, or holds something else there.
+    """
+    path, remedy = sheet_path(session), "Move it away, or give the parameters by --params."
+    values = _value(path, "twin", remedy)
+    if not isinstance(values, dict | None):
+        raise BagError(f"{path}, twin: not a block of names and values, as `boom_twin record` writes it. {remedy}")
+    return values or {}, f"{path}, twin"
+
+
+def missed_messages(session: Path) -> dict[str, int]:
+    """Return the number of messages that never reached the recorder, by topic, as counted at its end; only those above 0."""
+    try:
+        counts = _value(sheet_path(session), "counts", "")
+    except BagError:
+        return {}  # whoever needs the sheet's scene or mapping is told
+    rows = [row for row in counts if isinstance(row, dict)] if isinstance(counts, list | tuple) else []
+    found = {str(row.get("topic")): row.get("missed") for row in rows}
+    return {topic: missed for topic, missed in found.items() if isinstance(missed, int) and missed > 0}
+
+
+def _value(path: Path, key: str, remedy: str) -> Any:
+    """Return the value of a ``session.yaml`` under `key`; None without file or key."""
+    if not holds_file(path):
+        return None
+    document = read_plain(path, BagError, remedy, received=True)
+    if not isinstance(document, dict | None):
+        raise BagError(f"{path}: a list or a value, not what `boom_twin record` writes. {remedy}")
+    return (document or {}).get(key)
+
+
+def kept_origin(session: Path) -> dict[str, str]:
+    """Return the note ``origin`` of a ``session.yaml``, for storages without notes; empty if it cannot be read."""
+    try:
+        found = kept(session, "origin", "--scene")
+    except BagError:
+        return {}  # a note is not worth a refusal: whoever needs the sheet's scene or mapping is told
+    return {"origin": found.text} if found else {}
+
+
+def sha256(text: str) -> str:
+    """Return the SHA-256 of a text in UTF-8, as hexadecimal digits."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _block(text: str | None) -> str | None:
+    """Return a text as a YAML literal block if YAML reads it back unchanged, else as a quoted string."""
+    if not text:
+        return None
+    block: str = LiteralScalarString(text)
+    try:
+        if plain(dump({"": block})) == {"": text}:
+            return block
+    except ValueError:
+        pass
+    quoted: str = DoubleQuotedScalarString(text)
+    return quoted
+
+
+def _time(moment: datetime) -> str:
+    return moment.isoformat(timespec="milliseconds")
+
+
+_BEGUN, _ENDED = (re.compile(rb"^%b:" % key, re.MULTILINE) for key in (b"started", b"ended"))
+"""Patterns of the lines that the recorder writes at its start and at its end. Texts in ``session.yaml`` are indented."""
+
+
+def incompleteness(path: Path) -> str:
+    """Return the reason why a session or a result is incomplete; empty if its folder does not mark it as incomplete.
+
+    `path` is a folder or a file in it; also ``bag`` in the folder of a replay, and ``A/bag`` in that of a comparison.
+    """
+    folder = path if path.is_dir() else path.parent
+    for place in (folder, *folder.resolve().parents[:2]):
+        if is_unfinished(place):
+            return f"incomplete: {place / UNFINISHED} says that its command was stopped, or is still at work. Run it again."
+    sheet = folder / FILE_NAME
+    if sheet.is_file():
+        with sheet.open("rb") as stream:
+            text = stream.read(LARGEST_FILE)
+        if _BEGUN.search(text) and not _ENDED.search(text):
+            return f"incomplete: the recorder was ended by force, or is still at work: {sheet} tells no end."
+    return ""
+
 
 DEFAULT_MAPPING = "default mapping"
 DEFAULT_PARAMETERS = "default parameters"
@@ -68,27 +241,16 @@ def scene_of(session: Path, given: SceneSource | SessionScene = None) -> Session
     own = kept(session, "scene", "--scene") if given is None else None
     if own is None:
         return scene_from(given)
+    recorded, digest = kept(session, "scene_sha256", "--scene"), sha256(own.text)
     try:
-        scene, oddities = examine_text(own.text, own.source, whole=_recorded_sha256(session) == sha256(own.text))
+        scene, oddities = examine_text(own.text, own.source, whole=recorded is not None and recorded.text == digest)
     except SceneError as error:
         more = f" (and {len(error.faults) - 1} more)" if len(error.faults) > 1 else ""
         raise BagError(f"{own.source}: {error.faults[0]}{more} Give the scene by --scene.") from None
-    return SessionScene(scene, own.text, own.source, (*_changed(session, own), *oddities))
-
-
-def _changed(session: Path, own: KeptText) -> list[Fault]:
-    """Return a fault if the text differs from the recorded one."""
-    digest = _recorded_sha256(session)
-    if digest in (None, sha256(own.text)):
-        return []
-    bound = f"{own.source} has {sha256(own.text)[:12]}..: it was changed since the session was made"
-    return [Fault("scene_sha256", digest, bound, "Give the scene that is right by --scene.")]
-
-
-def _recorded_sha256(session: Path) -> str | None:
-    """Return the SHA-256 of the scene's text at the time of the session; None if it was not kept."""
-    digest = kept(session, "scene_sha256", "--scene")
-    return None if digest is None else digest.text
+    if recorded is not None and recorded.text != digest:
+        bound = f"{own.source} has {digest[:12]}..: it was changed since the session was made"
+        oddities = [Fault("scene_sha256", recorded.text, bound, "Give the scene that is right by --scene."), *oddities]
+    return SessionScene(scene, own.text, own.source, tuple(oddities))
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +324,8 @@ def strokes_of(session: Path | None, mapped: Mapped) -> SessionStrokes:
         except ValueError:
             bound = f"it must be {' or '.join(StrokeReading)}"
             raise BagError(f"{own.source}: {own.text[:60]!r}: {bound}. Give reads in a mapping by --mapping.") from None
-    version = rig_version(session) if session is not None else ""
+    path = None if session is None else sheet_path(session)
+    version = str(_value(path, "boom_twin", "")) if path and _value(path, "origin", "") == RIG_ORIGIN else ""
     made = re.match(r"(\d{1,9})\.(\d{1,9})", version)
     if made and (int(made[1]), int(made[2])) < LENGTHS_SINCE:
         return SessionStrokes(StrokeReading.DRIVE, f"made by the virtual rig of version {version}")

@@ -1,30 +1,96 @@
-"""Writer of a session from samples of a live source, without ROS."""
+"""Writers of sessions without ROS: from arrays of samples, and from samples of a live source."""
 
 from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import __version__
 from ..errors import BagError, UsageError
 from ..messages.mapping import load_mapping
-from ..messages.topic_table import Topics, factor
-from ..messages.type_store import jazzy
+from ..messages.topic_table import FRAME, Topics, every_input, factor
+from ..messages.type_store import fill_header, jazzy, new_message
 from ..scene.load import SceneSource
-from ..twin.readings import samples_of
-from ..types import SECOND, SENSORS, Sample, Stream
+from ..twin.sample_check import samples_of as samples_by_name
+from ..types import SECOND, SENSORS, Array, Sample, Stream
 from .async_writer import FileSplit, Storage
-from .session_files import sensor_message
-from .session_model import scene_from
-from .session_sheet import SessionSheet
-from .writer import BagWriter, recorded
+from .session_model import SessionSheet, scene_from
+from .writer import BagWriter, MessageWriter, recorded
+
+_UNKNOWN = -1.0  # first element of a covariance: the quantity is not measured (REP-145)
+
+
+def write_samples(
+    directory: Path, samples: Iterable[Sample], streams: Iterable[Stream], description: Mapping[str, str]
+) -> None:
+    """Write the bag of one session into a new or empty folder from ordered `samples`, with the topics of `streams`.
+
+    Log times are the stamps. Readings that come beside others, those of a gyro, are in the messages with the same stamp.
+    `description` are the notes of the bag: describe the session, and state if it is synthetic. Raise BagError if `directory`
+    holds anything.
+    """
+    samples, inputs = list(samples), every_input()
+    beside = {
+        (SENSORS[sample.stream].beside, sample.stamp): sample.values for sample in samples if SENSORS[sample.stream].beside
+    }
+    topics = {stream.value: inputs[stream] for stream in streams if not SENSORS[stream].beside}
+    with MessageWriter(directory, topics, description) as bag:
+        for sample in samples:
+            if sample.stream.value in topics:
+                bag.write(
+                    sample.stream.value, sample.stamp, sensor_message(sample, beside.get((sample.stream.value, sample.stamp)))
+                )
+
+
+def samples_of(
+    stamps_ns: NDArray[np.int64], values: Mapping[Stream, Array], angle_stamps_ns: NDArray[np.int64] | None = None
+) -> list[Sample]:
+    """Return the samples of a session by stamp, from rows of readings; at equal stamps in the order of `values`.
+
+    A row without any value gives no sample.
+    """
+    other = {} if angle_stamps_ns is None else {Stream.ANGLES: angle_stamps_ns}
+    samples = [
+        Sample(stream, stamp, row)
+        for stream, rows in values.items()
+        for stamp, row in zip(other.get(stream, stamps_ns).tolist(), rows, strict=True)
+        if not np.isnan(row).all()
+    ]
+    return sorted(samples, key=lambda sample: sample.stamp)
+
+
+def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
+    """Return the message that a rig's sensor sends. An Imu has the acceleration in the plane, and the `rate` (1,) if given."""
+    kind = SENSORS[sample.stream]
+    msg = new_message(kind.message)
+    if not kind.is_named:
+        fill_header(msg.header, sample.stamp, kind.stem.removesuffix("_imu"))
+        if kind.field == "point":
+            msg.point.x, msg.point.z = map(float, sample.values)
+            return msg
+        msg.orientation.w = 1.0
+        msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = _UNKNOWN
+        if kind.beside:
+            rate, msg.linear_acceleration_covariance[0] = sample.values, _UNKNOWN
+        else:
+            msg.linear_acceleration.x, msg.linear_acceleration.z = map(float, sample.values)
+        if rate is not None:
+            msg.angular_velocity.y, msg.angular_velocity_covariance[0] = -float(rate[0]), 0.0
+        return msg
+    fill_header(msg.header, sample.stamp, FRAME)
+    joints = len(sample.values) // (len(kind.ends) or 1)
+    msg.name = [*kind.channels(joints)] if kind.gives else [f"{kind.named}_{end}" for end in kind.ends or range(1, 1 + joints)]
+    setattr(msg, kind.field, np.array(sample.values, dtype=float))
+    return msg
+
 
 CLOCK_SET = SECOND  # step back of a stamp (ns) above which a clock was set; a smaller one is a late row
 BY_NAME = "sensor_msgs/msg/JointState"
@@ -125,9 +191,9 @@ class SessionWriter:
         BagError
             The disk is full or fails, or does not keep up.
         UsageError
-            Readings by name cannot be used, see `boom_twin.twin.readings.samples_of`.
+            Readings by name cannot be used, see `boom_twin.twin.sample_check.samples_of`.
         """
-        samples = samples_of(sample, stamp_ns, self._joints) if isinstance(sample, Mapping) else [sample]
+        samples = samples_by_name(sample, stamp_ns, self._joints) if isinstance(sample, Mapping) else [sample]
         for each in samples:
             topic = self._topics.inputs.get(Stream(SENSORS[each.stream].beside or each.stream))
             if topic is None:

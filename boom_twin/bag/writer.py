@@ -13,10 +13,9 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from mcap.writer import CompressionType
 
 from ..errors import BagError
-from ..messages.encoded_block import EncodedBlock
+from ..messages.cdr_encoder import EncodedBlock
 from ..messages.topic_table import Topic
 from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
@@ -25,7 +24,7 @@ from . import metadata as bagmeta
 from .mcap_file import NOTES, PROFILE
 from .mcap_records import MOST_HELD
 from .mcap_writer import McapWriter
-from .metadata import Recorded, file_information, metadata_of
+from .metadata import Recorded, WrittenFile, metadata_of
 
 
 def claim_directory(directory: Path) -> None:
@@ -66,11 +65,10 @@ class BagWriter:
         self,
         directory: Path,
         notes: Mapping[str, str] | None = None,
-        compression: CompressionType = CompressionType.ZSTD,
         distro: str = "jazzy",
         chunk_size: int | None = None,
     ) -> None:
-        self.directory, self._distro, self._compression = directory, distro, compression
+        self.directory, self._distro = directory, distro
         self._chunk_size = chunk_size or CHUNK_SIZE
         self._notes = dict(notes or {})
         self.topics: list[Recorded] = []
@@ -78,7 +76,7 @@ class BagWriter:
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self.counts: Counter[int] = Counter()
         self.sync: Callable[[int], None] = os.fsync  # puts a file that is complete on the disk, by its descriptor
-        self._files: list[bagmeta.FileInformation] = []
+        self._files: list[WrittenFile] = []
         self._due = 0.0  # when metadata.yaml is written again at a split, s of `time.monotonic`
         self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
@@ -135,11 +133,6 @@ class BagWriter:
         return self._raw.fileno()
 
     @property
-    def completed(self) -> int:
-        """Number of complete files."""
-        return len(self._files)
-
-    @property
     def size(self) -> int:
         """Size of the open file on the disk, bytes, without data in memory."""
         return 0 if self._raw.closed else self._raw.tell()
@@ -178,7 +171,7 @@ class BagWriter:
         with self._as_bag_error():
             self._raw = self.file.open("xb", buffering=0)
             self._buffered = BufferedWriter(self._raw)
-            self._writer = McapWriter(self._buffered, PROFILE, LIBRARY, self._chunk_size, self._compression)
+            self._writer = McapWriter(self._buffered, PROFILE, LIBRARY, self._chunk_size)
             if self._notes:
                 self._writer.add_metadata(NOTES, self._notes)
             self._channels, self._schemas, self._span = [], {}, None
@@ -204,8 +197,7 @@ class BagWriter:
         self.sync(self.flush())
         self._completed += self.size
         self._raw.close()
-        first, last, count = self._span or (0, 0, 0)
-        self._files.append(file_information(file_name(len(self._files)), first, last, count))
+        self._files.append(WrittenFile(file_name(len(self._files)), *(self._span or (0, 0, 0))))
 
     @contextmanager
     def _as_bag_error(self) -> Iterator[None]:

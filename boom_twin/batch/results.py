@@ -1,148 +1,162 @@
-"""Folder of a batch: a file for every finished row, with which a second call continues, and the final table and page."""
+"""Page and summaries by rig of a batch: hours of work, fatigue damage and life, drift of figures over time."""
 
 from __future__ import annotations
 
-import fcntl
-import json
-import os
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from hashlib import sha256
-from html import escape
-from math import isfinite
+from math import isfinite, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 from urllib.parse import quote
 
-from .. import __version__
-from ..errors import BagError
-from ..plots.session import Trend, trends_picture
-from ..report.fatigue import LIVES, hours_as_text, yearly_as_text
-from ..report.html import Html, heading, image, page, paragraph, table
-from ..system.atomic_files import DRAFT, write_atomic
-from ..system.json_text import json_text
-from ..system.received_files import real_path
-from ..system.result_folder import check_lasting
-from ..system.terminal_text import printable
+import numpy as np
+from markupsafe import Markup
+from scipy.stats import t as student
+
+from ..plots.results import Trend, trends_picture
+from ..report.fatigue import LIVES, hours_as_text, hours_to_end, yearly_as_text
+from ..report.html import render
+from ..system.atomic_files import write_atomic
+from ..system.result_text import json_text
 from ..types import SECOND, sensor_kind
-from .rigs import LEAST_SESSIONS, Drift, RigSummary, as_dict
-from .session_task import ALARM, OK, Row
+from .folder import SESSIONS
+from .session_task import OK, Row
 
-MARK, TABLE, RIGS, PAGE = "batch.json", "sessions.parquet", "rigs.json", "batch.html"
-ROWS, SESSIONS = "rows", "sessions"  # folders of the rows, and of the replays
-DIGEST = "row_sha256"  # key of a row's digest in its file, by which a change is detected
-_OWN = frozenset({MARK, TABLE, RIGS, PAGE, ROWS, SESSIONS})
+HOUR, DAY = 3600.0, 86400.0  # s
+DAMAGE = "fatigue_damage_"  # prefix of the columns with the damage of a station
+DRIFTING = ("residual_mean_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
+"""Prefixes of the figures whose drift is computed."""
+LEAST_SESSIONS = 4  # least number of sessions for a drift: a line with two residual degrees of freedom
+CHANCE = 1e-3  # largest p-value of a significant drift, as in `boom_twin.report.quantities.SIGNIFICANT`
 
 
-@contextmanager
-def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
-    """Make or reopen the folder of a batch and lock it against other batches.
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """Change of a figure from first to last session, by a line of weighted least squares."""
 
-    None of the sessions to be read may lie in `out`, nor `out` in one of them. BagError if `out` holds anything else, another
-    batch works in it, or it cannot be written.
+    name: str
+    sessions: int
+    days: float
+    first: float  # value of the line at the first session
+    change: float
+    sigma: float  # standard deviation of `change`, at least that from the scatter
+    is_significant: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Life:
+    """Fatigue of a rig's station with the largest damage, summed over sessions."""
+
+    category: float  # detail category, MPa
+    station: str
+    damage: float
+    sigma: float | None  # standard deviation from the scatter of sessions; None below `LEAST_SESSIONS`
+    largest_share: float  # largest share of `damage` by one session
+    sessions: int
+    hours: float  # total of these sessions
+    has_heights: bool  # heights of the sections are in the scene
+    stations: dict[str, float]  # damage of every station
+
+    @property
+    def hours_to_end(self) -> float | None:
+        """Hours of the same work until the damage is 1; None without damage."""
+        return hours_to_end(self.damage, self.hours)
+
+    def hours_a_year(self, years: float) -> float | None:
+        """Return the hours per year of the same work until a damage of 1 in `years`; None without damage."""
+        return None if self.hours_to_end is None else self.hours_to_end / years
+
+
+@dataclass(frozen=True, slots=True)
+class RigSummary:
+    """Summary of one rig. Sessions with equal files count once."""
+
+    rig: str
+    sessions: int
+    repeated: int  # sessions left out, because another one has equal files
+    hours: float
+    alarmed: int  # sessions with alarms
+    causes: dict[str, int]  # sessions in which a cause was named
+    life: Life | None  # None unless fatigue was asked for
+    drifts: list[Drift]
+
+
+def rigs_of(rows: Sequence[Row]) -> list[RigSummary]:
+    """Return a summary of each rig with a finished session, sorted by name."""
+    rigs: dict[str, list[Row]] = {}
+    for row in sorted((row for row in rows if row["status"] == OK), key=lambda row: int(row["first_stamp_ns"])):
+        rigs.setdefault(row["rig"], []).append(row)
+    return [_summary(rig, found) for rig, found in sorted(rigs.items())]
+
+
+def as_dict(rig: RigSummary) -> dict[str, object]:
+    """Return a summary as plain values, including hours to damage 1."""
+    life = rig.life
+    told = None if life is None else {
+        "detail_category_MPa": life.category, "station": life.station, "damage": life.damage, "damage_sigma": life.sigma,
+        "damage_largest_share": life.largest_share, "sessions": life.sessions, "hours": life.hours,
+        "section_heights_given": life.has_heights, "hours_to_damage_1": life.hours_to_end,
+        **{f"hours_a_year_for_{years}_years": life.hours_a_year(years) for years in LIVES},
+        "damage_by_station": life.stations,
+    }  # fmt: skip
+    return {
+        "rig": rig.rig, "sessions": rig.sessions, "repeated": rig.repeated, "hours": rig.hours, "with_alarms": rig.alarmed,
+        "causes": rig.causes, "fatigue": told, "drifts": rig.drifts,
+    }  # fmt: skip
+
+
+def _summary(rig: str, rows: list[Row]) -> RigSummary:
+    once = [*{row["file_sha256"]: row for row in reversed(rows)}.values()][::-1]
+    causes = Counter(cause for row in once for cause in {alarm["cause"] for alarm in row["alarms"]} if cause)
+    names = sorted({name for row in once for name in row if name.startswith(DRIFTING) and not name.endswith("_sigma")})
+    drifts = [drift for name in names if (drift := drift_of(name, once)) is not None]
+    hours, alarmed = sum(row["duration_s"] for row in once) / HOUR, sum(bool(row["alarms"]) for row in once)
+    return RigSummary(rig, len(once), len(rows) - len(once), hours, alarmed, dict(causes.most_common()), _life(once), drifts)
+
+
+def _life(rows: list[Row]) -> Life | None:
+    own = [row for row in rows if any(name.startswith(DAMAGE) for name in row)]
+    if not own:
+        return None
+    names = dict.fromkeys(name for row in own for name in row if name.startswith(DAMAGE))
+    sums = {name: sum(row.get(name, 0.0) for row in own) for name in names}
+    worst = max(sums, key=lambda name: sums[name])
+    damages, hours = np.array([row.get(worst, 0.0) for row in own]), np.array([row["duration_s"] / HOUR for row in own])
+    total, count, sigma = sums[worst], len(own), None
+    if count >= LEAST_SESSIONS:  # ratio estimate: scatter about the mean damage per hour
+        sigma = float(np.sqrt(count / (count - 1) * np.sum((damages - total / hours.sum() * hours) ** 2)))
+    share, has_heights = damages.max() / total if total > 0.0 else 0.0, all(row["section_heights_given"] for row in own)
+    stations = {name.removeprefix(DAMAGE): value for name, value in sums.items()}
+    category, station = own[0]["fatigue_category_MPa"], worst.removeprefix(DAMAGE)
+    return Life(category, station, total, sigma, float(share), count, float(hours.sum()), has_heights, stations)
+
+
+def drift_of(name: str, rows: Sequence[Row]) -> Drift | None:
+    """Return the drift of a figure over sessions, or None if there are too few.
+
+    A least-squares line is fitted, weighted by the figure's standard deviations. The standard deviation of its slope is
+    enlarged if the scatter about the line is larger. Student's t tests the slope.
     """
-    check_lasting(out)
-    place = real_path(out)
-    for session in sessions:
-        path = Path(os.path.realpath(session))
-        if path == place or place in path.parents or path in place.parents:
-            raise BagError(f"{out}: {session} lies in it, or it in the session, and a source is never touched. Choose another.")
-    try:
-        others = sorted({each.name for each in place.iterdir()} - _OWN) if place.exists() else []
-        is_new = not (place / MARK).is_file()
-        if (is_new and place.exists() and any(place.iterdir())) or any(not name.endswith(DRAFT) for name in others):
-            raise BagError(f"{out}: holds {(others or ['results'])[0]}, which no batch left. Choose a new folder.")
-        for folder in (place / ROWS, place / SESSIONS):
-            folder.mkdir(parents=True, exist_ok=True)
-        lock = os.open(place / MARK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
-    except OSError as error:
-        raise BagError(f"{out}: cannot be written ({error.strerror}). Choose a folder that can.") from None
-    try:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise BagError(f"{out}: another `boom_twin batch` is at work there. Wait for its end, or choose another.") from None
-        yield BatchFolder(place, lock)
-    finally:
-        os.close(lock)
+    known = [row for row in rows if _is_number(row.get(name)) and _is_number(row.get(f"{name}_sigma"))]
+    found = np.array([(row["first_stamp_ns"] / SECOND / DAY, row[name], row[f"{name}_sigma"]) for row in known]).reshape(-1, 3)
+    days, values, sigmas = found[found[:, 2] > 0.0].T
+    if len(days) < LEAST_SESSIONS or not np.ptp(days) > 0.0:
+        return None
+    weights = sigmas**-2.0
+    away = days - weights @ days / weights.sum()
+    mean, size = float(weights @ values / weights.sum()), float(weights @ away**2)
+    slope, freedom = float(weights @ (away * (values - mean))) / size, len(days) - 2
+    scatter = float(weights @ (values - mean - slope * away) ** 2) / freedom
+    sigma = sqrt(max(1.0, scatter) / size)
+    chance = 2.0 * float(student.sf(abs(slope) / sigma, freedom))
+    span = float(np.ptp(days))
+    return Drift(name, len(days), span, mean + slope * float(away.min()), slope * span, sigma * span, chance < CHANCE)
 
 
-class BatchFolder:
-    """Rows and replays of a batch in its folder; see `batch_folder`."""
-
-    def __init__(self, folder: Path, lock: int) -> None:
-        self.folder, self._lock = folder, lock
-
-    def replay(self, key: str) -> Path:
-        """Return the folder of the replay of a session."""
-        return self.folder / SESSIONS / key
-
-    def kept(self, key: str, fingerprint: str) -> Row | None:
-        """Return the row of a session if it is finished and its `fingerprint` is equal; None otherwise.
-
-        BagError if the file was changed since `keep` wrote it.
-        """
-        file = self.folder / ROWS / f"{key}.json"
-        try:
-            row = json.loads(file.read_bytes())
-            if row.pop(DIGEST) != _digest(row):
-                raise ValueError("changed")
-        except FileNotFoundError:
-            return None
-        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
-            raise BagError(f"{file}: this row of an earlier call is damaged. Its session is done anew.") from None
-        return dict(row) if row["fingerprint"] == fingerprint else None
-
-    def keep(self, row: Row) -> None:
-        """Write a finished row to its file."""
-        write_atomic(self.folder / ROWS / f"{row['key']}.json", json.dumps(row | {DIGEST: _digest(row)}) + "\n")
-
-    def mark(self, total: int, finished: int) -> None:
-        """Write the number of finished sessions and the state of the batch."""
-        state = "complete" if finished == total else "unfinished: the same command goes on with it"
-        told = {"command": "batch", "version": __version__, "sessions": total, "finished": finished, "state": state}
-        os.truncate(self._lock, 0)
-        os.pwrite(self._lock, (json.dumps(told) + "\n").encode(), 0)
-
-
-def _digest(row: Row) -> str:
-    return sha256(json.dumps(row).encode()).hexdigest()
-
-
-_ALWAYS: dict[str, str] = {
-    "session": "string", "path": "string", "rig": "string", "status": "string", "reason": "string", "attempts": "int64",
-    "first_stamp_ns": "int64", "duration_s": "double", "samples": "int64", "dropped": "int64", "outside_validity": "int64",
-    "wall_s": "double", "realtime_factor": "double", "peak_memory_bytes": "int64", "tip_acceleration_max_m_s2": "double",
-    "joint_residual_rms_rad": "list", "joint_residual_normalised_mean": "list", "joint_residual_normalised_std": "list",
-    "session_incomplete": "string", "file_sha256": "string", "output_sha256": "string", "scene": "string",
-    "scene_sha256": "string", "mapping": "string", "version": "string", "fingerprint": "string",
-    "key": "string", "report": "bool", "section_heights_given": "bool", "calibration_reason": "string",
-    "calibration_remarks": "string",
-}  # fmt: skip
-"""Columns that every table has, with their types; the others are the figures of `boom_twin.report.quantities`, numbers."""
-
-
-def write_table(path: Path, rows: Sequence[Row]) -> None:
-    """Write all rows as Parquet, one for each session. A column that a row lacks is null there."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    alarm = pa.struct([(name, pa.float64() if name.endswith("_s") else pa.string()) for name in ALARM])
-    types: dict[str, Any] = {
-        **{name: pa.list_(pa.float64()) if kind == "list" else pa.type_for_alias(kind) for name, kind in _ALWAYS.items()},
-        "alarms": pa.list_(alarm),
-        "events": pa.list_(pa.struct([("event", pa.string()), ("count", pa.int64())])),
-    }
-    rows = [{name: printable(value) if isinstance(value, str) else value for name, value in row.items()} for row in rows]
-    figures = sorted({name for row in rows for name in row} - types.keys())
-    words = {name for row in rows for name, value in row.items() if isinstance(value, str)}
-    types |= {name: pa.string() if name in words else pa.float64() for name in figures}
-    columns = [pa.array([row.get(name) for row in rows], kind) for name, kind in types.items()]
-    sink = pa.BufferOutputStream()
-    pq.write_table(pa.table(columns, schema=pa.schema(list(types.items()))), sink)
-    write_atomic(path, sink.getvalue().to_pybytes())
+def _is_number(value: object) -> bool:
+    return isinstance(value, float | int) and isfinite(value)
 
 
 def write_rigs(path: Path, rigs: Sequence[RigSummary]) -> None:
@@ -156,22 +170,6 @@ def counts(rows: Sequence[Row]) -> tuple[int, int]:
     return right, len(rows) - right
 
 
-SORT = """<script>
-const compared = (a, b) => isNaN(a) || isNaN(b) ? a.localeCompare(b) : a - b;
-document.querySelectorAll('.sorted th').forEach((head, column) => head.onclick = () => {
-  const body = head.closest('table').tBodies[0], way = head.dataset.way === '1' ? -1 : 1;
-  const text = row => row.cells[column].textContent;
-  head.dataset.way = way;
-  const order = (a, b) => a === '-' || b === '-' ? (a === '-') - (b === '-') : way * compared(a, b);
-  [...body.rows].sort((one, other) => order(text(one), text(other))).forEach(row => body.append(row));
-});
-</script>
-<style>
-body { max-width: 1400px } .sorted, .wide { overflow-x: auto } .sorted th { cursor: pointer }
-tr:has(.alarm) td { background: #fff0e6 }
-.sorted td { white-space: nowrap } .sorted td:last-child { white-space: normal; min-width: 8em }
-@media (max-width: 1300px) { .sorted table { font-size: 13px } .sorted th, .sorted td { padding: .22em .4em } }
-</style>"""
 COLUMNS = (
     "session", "rig", "begin", "state", "duration, s", "times real time", "alarms", "causes",
     "worst residual / expected", "lowest mode / model", "tip, m/s² at most", "left out", "reason",
@@ -184,29 +182,37 @@ MAX_TRENDS = 24
 def write_page(path: Path, rows: Sequence[Row], rigs: Sequence[RigSummary]) -> None:
     """Write the page beside the folder of the replays. The page loads nothing from other files."""
     right, wrong = counts(rows)
-    alarmed = sum(bool(row.get("alarms")) for row in rows)
-    parts = [
-        heading(f"Batch of {len(rows)} sessions", 1),
-        paragraph(f"{right} right, of which {alarmed} with alarms; {wrong} failed.", "alarm" if wrong or alarmed else "well"),
-        *_by_rig(rigs),
-        heading("Sessions"),
-        paragraph("A click on a column's title sorts by it. All figures are in sessions.parquet.", "note"),
-        f'<div class="sorted">{table(COLUMNS, map(_cells, rows))}</div>',
-        *_trends(rows, rigs),
-        SORT,
-    ]
-    write_atomic(path, page("Batch of sessions", parts))
+    lives = [rig.life for rig in rigs if rig.life is not None]
+    with TemporaryDirectory() as folder:
+        text = render(
+            "batch.html",
+            title="Batch of sessions",
+            right=right,
+            wrong=wrong,
+            alarmed=sum(bool(row.get("alarms")) for row in rows),
+            rig_head=RIG_COLUMNS,
+            rigs=map(_rig_cells, rigs),
+            category=f"{lives[0].category:g}" if lives else None,
+            has_heights=all(life.has_heights for life in lives),
+            least=LEAST_SESSIONS,
+            repeated=sum(rig.repeated for rig in rigs),
+            head=COLUMNS,
+            sessions=list(map(_cells, rows)),
+            trends=list(_trends(rows, rigs, Path(folder))),
+        )
+    write_atomic(path, text)
 
 
 def _cells(row: Row) -> tuple[object, ...]:
     name, is_right, begin = str(row["session"]), row["status"] == OK, row.get("first_stamp_ns")
+    link = Markup('<a href="{}">{}</a>').format(f"{SESSIONS}/{quote(row['key'])}/report.html", name)
     alarms = row.get("alarms") or []
     deviations = [value for value in row.get("joint_residual_normalised_std") or [] if value is not None]
     return (
-        Html(f'<a href="{SESSIONS}/{quote(row["key"])}/report.html">{escape(name)}</a>') if row.get("report") else name,
+        link if row.get("report") else name,
         row.get("rig"),
         None if begin is None else str(datetime.fromtimestamp(begin // SECOND, UTC).replace(tzinfo=None)),
-        OK if is_right else Html(f'<span class="alarm">{escape(row["status"])}</span>'),
+        OK if is_right else Markup('<span class="alarm">{}</span>').format(row["status"]),
         row.get("duration_s"),
         row.get("realtime_factor"),
         len(alarms) if is_right else None,
@@ -223,25 +229,6 @@ RIG_COLUMNS = (
     "rig", "sessions", "hours", "with alarms", "causes named (sessions)", "damage", "at station", "by one session, %",
     "hours of such work to damage 1", *(f"h a year for {years} years" for years in LIVES),
 )  # fmt: skip
-DAMAGE_NOTE = (
-    "Damage (Palmgren and Miner) is the sum of the sessions at the station where it is largest, by the predicted bending "
-    "stress for detail category {category:g} MPa of EN 1993-1-9, without partial factors. Hours are of work as in these "
-    "sessions. Work of other kinds, and vibration that only sensors show, such as by a pump, are NOT in it. "
-)
-ASSUMED = "Section heights are not in every scene: stresses are those of thin-walled boxes there. "
-
-
-def _by_rig(rigs: Sequence[RigSummary]) -> Iterator[str]:
-    yield heading("Rigs")
-    yield f'<div class="wide">{table(RIG_COLUMNS, map(_rig_cells, rigs))}</div>'
-    lives = [rig.life for rig in rigs if rig.life is not None]
-    if not lives:
-        yield paragraph("Damage is not known: give --fatigue, and sections that bend.", "note")
-    else:
-        told = DAMAGE_NOTE.format(category=lives[0].category) + ("" if all(life.has_heights for life in lives) else ASSUMED)
-        yield paragraph(told + f"± is the scatter of the sessions, not known below {LEAST_SESSIONS} of them.", "note")
-    if repeated := sum(rig.repeated for rig in rigs):
-        yield paragraph(f"Counted once: {repeated} sessions whose files equal those of another one.", "note")
 
 
 def _rig_cells(rig: RigSummary) -> tuple[object, ...]:
@@ -255,27 +242,10 @@ def _rig_cells(rig: RigSummary) -> tuple[object, ...]:
     return *start, damage, place, 100.0 * life.largest_share, hours_as_text(life.hours_to_end), *years
 
 
-DRIFT_NOTE = (
-    f"Change from the first session to the last, along a line of weighted least squares. It needs {LEAST_SESSIONS} sessions "
-    "with a standard deviation. DRIFTS: by chance less than once in a thousand. Other postures, loads and temperatures change "
-    "figures, too."
-)
-
-
-def _drifts(rig: RigSummary) -> Iterator[str]:
-    if not rig.drifts:
-        yield paragraph(f"Drift is not known: fewer than {LEAST_SESSIONS} sessions have one figure at different times.", "note")
-        return
-    rows = [
-        (_with_unit(each.name), each.sessions, each.days, each.first, f"{each.change:+.3g} ± {each.sigma:.1g}", _verdict(each))
-        for each in sorted(rig.drifts, key=lambda drift: not drift.is_significant)
-    ]
-    yield paragraph(DRIFT_NOTE, "note")
-    yield table(("figure", "sessions", "days", "at first", "change", "verdict"), rows)
-
-
-def _verdict(drift: Drift) -> object:
-    return Html('<span class="alarm">DRIFTS</span>') if drift.is_significant else "may be chance"
+def _drift_cells(drift: Drift) -> tuple[object, ...]:
+    verdict = Markup('<span class="alarm">DRIFTS</span>') if drift.is_significant else "may be chance"
+    change = f"{drift.change:+.3g} ± {drift.sigma:.1g}"
+    return _with_unit(drift.name), drift.sessions, drift.days, drift.first, change, verdict
 
 
 def _with_unit(name: str) -> str:
@@ -284,25 +254,23 @@ def _with_unit(name: str) -> str:
     return name if channel == name else f"{name}, {sensor_kind(channel).unit}"
 
 
-def _trends(rows: Sequence[Row], summaries: Sequence[RigSummary]) -> Iterator[str]:
-    """Yield drift and pictures of wear-related figures over time, for every rig with several sessions."""
+def _trends(rows: Sequence[Row], summaries: Sequence[RigSummary], folder: Path) -> Iterator[dict[str, object]]:
+    """Yield name, drifts and picture in `folder` of wear-related figures over time, for every rig with several sessions."""
     by_name = {rig.rig: rig for rig in summaries}
     rigs: dict[str, list[Row]] = {}
     for row in rows:
         if row["status"] == OK:
             rigs.setdefault(row["rig"], []).append(row)
-    for rig, found in sorted(rigs.items()):
+    for number, (rig, found) in enumerate(sorted(rigs.items())):
         found.sort(key=lambda row: int(row["first_stamp_ns"]))
         names = sorted({name for row in found for name in row if name.startswith(TRENDS) and not name.endswith("_sigma")})
         trends = [trend for name in names if len((trend := _trend(name, found)).values) > 1][:MAX_TRENDS]
         if trends:
-            yield heading(f"Over time: {rig}")
-            yield from _drifts(by_name[rig])
-            yield paragraph("Sessions by the stamp of their first prediction; bars are standard deviations.", "note")
-            with TemporaryDirectory() as folder:
-                picture = Path(folder) / "trends.png"
-                trends_picture(picture, rig, trends)
-                yield image(picture, "; ".join(trend.label for trend in trends))
+            picture = folder / f"{number}.png"
+            trends_picture(picture, rig, trends)
+            drifts = sorted(by_name[rig].drifts, key=lambda drift: not drift.is_significant)
+            labels = "; ".join(trend.label for trend in trends)
+            yield {"name": rig, "drifts": list(map(_drift_cells, drifts)), "picture": picture, "labels": labels}
 
 
 def _trend(name: str, rows: Sequence[Row]) -> Trend:

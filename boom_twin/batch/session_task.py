@@ -1,31 +1,36 @@
-"""One session of a batch: its task, the supervised process that does it, and the resulting row of the table."""
+"""Sessions of a batch in parallel: task, supervised process and row of each; threads that wait for them, here or on Dask."""
 
 from __future__ import annotations
 
 import json
 import os
+import signal
+import subprocess
 import sys
-from contextlib import suppress
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from shutil import rmtree
+from tempfile import TemporaryFile
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..errors import BoomTwinError
-from ..system.child_process import python_command
+from ..errors import BagError, BoomTwinError, UsageError
+from ..system.processes import python_command
 
 if TYPE_CHECKING:
+    from distributed import Client
+
+    from ..bag.session_file import TimeWindow
     from ..bag.session_model import SessionScene
-    from ..bag.time_window import TimeWindow
     from ..config.settings import Settings
     from ..scene.schema import Scene
-import signal
-import subprocess
-import time
-from collections.abc import Mapping, Sequence
-from tempfile import TemporaryFile
-from threading import Thread
 
 LOOK_PERIOD = 0.1  # seconds between two measurements of the memory
 STDERR_BYTES = 2000  # number of last bytes of a process's stderr that are reported
@@ -119,7 +124,7 @@ class SessionTask:
     key: str  # of its row
     session: str
     out: str  # folder of its replay
-    fingerprint: str  # see `boom_twin.batch.sources.fingerprint`
+    fingerprint: str  # see `boom_twin.batch.folder.fingerprint`
     scene: str | None
     params: str | None
     mapping: str | None
@@ -128,7 +133,7 @@ class SessionTask:
     time: float  # limit, s
     memory: int  # limit of resident memory, bytes
     retries: int  # further attempts if the session fails
-    start: float = 0.0  # of the window, s, see `boom_twin.bag.time_window.TimeWindow`
+    start: float = 0.0  # of the window, s, see `boom_twin.bag.session_file.TimeWindow`
     duration: float | None = None
     calibrate: bool = False  # the scene's parameters from the session as well; that assumes a healthy rig
     fatigue: float | None = None  # detail category, MPa, of the damage of all stations; None: it is not counted
@@ -163,13 +168,12 @@ def _head(task: SessionTask) -> Row:
 def row_of(task: SessionTask) -> Row:
     """Replay a session and return its row; errors are those of `boom_twin.offline.replay.replay`."""
     from ..bag.reader import files_sha256
+    from ..bag.session_file import TimeWindow
     from ..bag.session_model import scene_of, settings_of
-    from ..bag.time_window import TimeWindow
     from ..offline.history import draw
     from ..offline.inputs import ReplayOptions
     from ..report.evaluation import evaluated_replay
     from ..report.page import write_report
-    from ..report.quantities import read
     from ..system.result_folder import REPLAY, result_folder
 
     session, params = Path(task.session), None if task.params is None else Path(task.params)
@@ -181,7 +185,6 @@ def row_of(task: SessionTask) -> Row:
         if task.report:
             draw(found.result, found.history, found.scene, building)
             write_report(found, building)
-        _, quantities = read(building)
         if not task.keep_bag:
             rmtree(building / "bag")
     result, summary = found.result, found.result.summary
@@ -194,7 +197,7 @@ def row_of(task: SessionTask) -> Row:
         "alarms": [{name: alarm[name] for name in ALARM} for alarm in summary["alarms"]],
         "events": [{"event": name, "count": count} for name, count in summary["events"].items()],
     }
-    for each in quantities:
+    for each in found.quantities:
         row |= {each.name: each.value, f"{each.name}_sigma": each.sigma}
     if found.fatigue:
         row |= {"fatigue_category_MPa": task.fatigue, "section_heights_given": found.has_heights}
@@ -221,6 +224,102 @@ def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: Tim
             name = f"calibrated_{estimate.unknown.name}"
             row |= {name: estimate.value, f"{name}_sigma": (estimate.high - estimate.low) / (2.0 * BETWEEN)}
     return row
+
+
+REMEDY = 'Run `pip install "boom_twin[batch]"`.'
+KILLED = "the workers that had it were ended from outside. Look for what ends them, as the system's memory."
+COUNT_PERIOD = 5  # seconds between two counts of a cluster's workers
+CONNECT_TIMEOUT = 20.0  # seconds for a scheduler to answer
+
+
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """Workers of a batch: `work` returns the row of one session, `capacity` the number of sessions that may run at once."""
+
+    work: Callable[[SessionTask], Row]
+    capacity: Callable[[], int]
+    dashboard: str = ""
+
+
+@contextmanager
+def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
+    """Yield the workers of the scheduler at an address (``tcp://host:8786``), or those of this process, which opens no port.
+
+    `workers` is the number of sessions at once on this machine, by default that of its cores. UsageError if Dask is not
+    installed, BagError if no scheduler answers there.
+    """
+    if scheduler is None:
+        count = workers or os.cpu_count() or 1
+        yield Workers(run_task, lambda: count)
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise UsageError(f"dask is not installed, and --scheduler needs it. {REMEDY}") from None
+    try:
+        client = Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)
+    except (TimeoutError, OSError, ValueError) as error:
+        remedy = "Start `dask scheduler`, check host and port."
+        raise BagError(f"--scheduler {scheduler}: no Dask scheduler answers ({type(error).__name__}). {remedy}") from None
+    with client:
+        yield on_dask(client, run_task)
+
+
+def on_dask(client: Client, work: Callable[[SessionTask], Row]) -> Workers:
+    """Return workers that pass `work` to those of a Dask cluster.
+
+    A task whose worker ends (killed, out of memory, a lost machine) goes to another worker. When Dask gives the task up, that
+    counts as one of its attempts.
+    """
+    from distributed import KilledWorker
+
+    def row_of(task: SessionTask) -> Row:
+        for attempt in range(1, task.retries + 2):
+            future = client.submit(work, task, key=f"{task.key}-{attempt}", pure=False, retries=0)
+            try:
+                return dict(future.result())
+            except KilledWorker:
+                reason = KILLED
+            except CancelledError:  # as of a row that was lost with its worker
+                reason = f"Dask gave it up ({future.status})"
+            except Exception as error:
+                reason = f"{type(error).__name__}: {error}"
+        return failed(task, reason, attempt)
+
+    return Workers(row_of, lambda: sum(client.nthreads().values()), client.dashboard_link)
+
+
+def rows_of(workers: Workers, tasks: Sequence[SessionTask]) -> Iterator[Row]:
+    """Yield the rows of all tasks as they finish. A failed task does not affect other rows.
+
+    A scheduler gets no more tasks than its workers have threads. When a worker ends, Dask counts that against every task
+    that waits there, not only against the running one. Workers that join later are used, too.
+    """
+    waiting, rows, threads = deque(tasks), SimpleQueue[Row](), list[Thread]()
+
+    def go() -> None:
+        while waiting:
+            task = waiting.popleft()
+            try:
+                row = workers.work(task)
+            except Exception as error:
+                row = failed(task, f"{type(error).__name__}: {error}", 1)
+            rows.put(json.loads(json.dumps(row, ensure_ascii=False).encode(errors="replace")))  # names that are not UTF-8
+
+    try:
+        for _ in tasks:
+            row = None
+            while row is None:
+                for _ in range(min(max(workers.capacity(), 1), len(tasks)) - len(threads)):
+                    threads.append(Thread(target=go, daemon=True))  # sessions end with this process, see end_with_caller
+                    threads[-1].start()
+                try:
+                    row = rows.get(timeout=COUNT_PERIOD)
+                except Empty:
+                    continue
+            yield row
+    finally:
+        waiting.clear()
 
 
 def main() -> int:

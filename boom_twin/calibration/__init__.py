@@ -5,6 +5,7 @@ See docs/calibrate.md for what it does and what sessions it needs.
 
 from __future__ import annotations
 
-from .run import Calibration, Choice, Estimate, calibrate
+from .run import Calibration, Estimate, calibrate
+from .unknowns import Choice
 
 __all__ = ["Calibration", "Choice", "Estimate", "calibrate"]

@@ -1,4 +1,4 @@
-"""Maximum-likelihood estimate of the unknowns, its covariance, and the unknowns that sessions cannot tell apart.
+"""Innovations of all rest periods as a function of the unknowns, their maximum-likelihood estimate, and what cannot be told.
 
 The innovations e of a Kalman filter with variances S have the log likelihood -sum (e^2 / S + log S) / 2. Scoring (Gauss-Newton
 with the Fisher information of both) finds its maximum with the priors. The covariance is H^-1 J H^-1 (H. White, Econometrica 50
@@ -9,21 +9,157 @@ ch. 6).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.optimize import lsq_linear, minimize, minimize_scalar
 
-from ..types import Array
-from .problem import CalibrationProblem, Noise, likelihood_cost
+from ..deviation.channels import IMU_ZERO
+from ..deviation.kalman import ANGLE_ZERO
+from ..deviation.predictor import BoomPredictor
+from ..scene.edit import with_parameters
+from ..scene.kinematics import gravity_in_base
+from ..scene.schema import Scene
+from ..scene.summary import weight_of
+from ..system.processes import usable_cores
+from ..types import SENSORS, Array, channels_of
+from .rest_filter import filter_rest
+from .sessions import STREAMS, RestPeriod, Rigging, channel_names
 from .unknowns import Unknown
 
+DIFFERENCE = 3e-3  # of a prior's deviation, of derivatives
+BLOCK = 2.0  # s of a block of readings, which are taken to depend on each other
+LOADS, USUAL = (1e-5, 0.3), 2.5e-3  # shares of the boom's weight, between which the load's size is looked for; at first
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Variances of the fast load in each rest period along x and y, (k, 2), N^2, and of the channels' noise (c,), SI."""
+
+    loads: Array
+    channels: Array
+
+
+RestFilter = Callable[[Array, Array, Array], tuple[Array, Array]]
+"""Variances of the fast load (2,), of the sensors' noise (c,), of zeros, see `filter_rest` -> innovations with their variances,
+(r, 2), and the zeros at the end of the rest period."""
+
+
+class CalibrationProblem:
+    """Innovations of all rest periods as a function of the unknowns.
+
+    Unknowns are counted in standard deviations of their priors, from the present values (`Unknown.value`). `channels` (r,)
+    has the channel of each reading, `blocks` (r,) ascending numbers of blocks of `BLOCK` s.
+    """
+
+    def __init__(self, scene: Scene, unknowns: Sequence[Unknown], periods: Sequence[RestPeriod], rigging: Rigging) -> None:
+        self.scene, self.unknowns, self._periods, self._rigging = scene, unknowns, periods, rigging
+        self.names = channel_names(len(scene.joints))
+        self.channels = np.concatenate([period.channels for period in periods])
+        spans = [np.floor(period.times / BLOCK) + 1e6 * k for k, period in enumerate(periods)]
+        self.blocks = np.unique(np.concatenate(spans), return_inverse=True)[1]
+        joints, zeroed = len(scene.joints), {unknown.channel: unknown.kind.prior for unknown in unknowns}
+        self._zeroed = (*self.names[2 * joints : 2 * joints + 2], *self.names[joints : 2 * joints])
+        self._prior2 = np.array([zeroed.get(name, 0.0) ** 2 for name in self._zeroed])
+        axes2 = [0.0 if name in zeroed else IMU_ZERO**2 for name in self._zeroed[:2]]
+        self._zero2 = np.array(axes2 + joints * [ANGLE_ZERO**2])  # of angles: the error of the model's statics
+        self._gravity, self._weight = gravity_in_base(scene), weight_of(scene)
+
+    @property
+    def least(self) -> Array:
+        """Lower bounds of the deviations, shape (p,)."""
+        return np.array([unknown.least for unknown in self.unknowns])
+
+    def sensor_noise(self) -> Array:
+        """Return the variances that the settings state, by channel."""
+        widths = [len(channels_of(len(self.scene.joints))[stream]) for stream in STREAMS]
+        return np.repeat([self._rigging.settings.variance(SENSORS[stream]) for stream in STREAMS], widths)
+
+    def start(self) -> Array:
+        """Return the deviations to start from: zeros of angle sensors and IMU that rest periods show one by one, shape (p,)."""
+        usual = Noise(np.full((len(self._periods), 2), (USUAL * self._weight) ** 2), self.sensor_noise())
+        at_rest, pairs = self._boom_at({}), zip(self._periods, usual.loads, strict=True)
+        seen = [at_rest(period)(loads, usual.channels, self._zero2 + self._prior2)[1] for period, loads in pairs]
+        zeros = dict(zip(self._zeroed, np.mean(seen, axis=0).tolist(), strict=True))
+        return np.array([zeros.get(unknown.channel or "", 0.0) / unknown.kind.prior for unknown in self.unknowns])
+
+    def values(self, deviations: Array) -> dict[str, float]:
+        """Return the unknowns by name, SI."""
+        return {unknown.name: unknown.value(at) for unknown, at in zip(self.unknowns, deviations.tolist(), strict=True)}
+
+    def innovations(self, trials: Iterable[dict[str, float]], noise: Noise) -> list[Array]:
+        """Return innovations and their variances, (r, 2), of several trials of parameters and zeros (SI, by name)."""
+
+        def of(trial: dict[str, float]) -> Array:
+            at_rest, pairs = self._boom_at(trial), zip(self._periods, noise.loads, strict=True)
+            return np.concatenate([at_rest(period)(loads, noise.channels, self._zero2)[0] for period, loads in pairs])
+
+        with ThreadPoolExecutor(usable_cores()) as pool:
+            return list(pool.map(of, trials))
+
+    def _boom_at(self, trial: dict[str, float]) -> Callable[[RestPeriod], RestFilter]:
+        """Return a function that puts the boom of a trial to rest in a period, and returns its filter there.
+
+        The boom has the parameters of the trial, and its sensors read too much by the trial's zeros.
+        """
+        scene = with_parameters(self.scene, {name: value for name, value in trial.items() if not name.endswith(".zero")})
+        zeros, rigging = np.array([trial.get(f"{name}.zero", 0.0) for name in self.names]), self._rigging
+        boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads, rigging.places)
+
+        def at_rest(period: RestPeriod) -> RestFilter:
+            boom.start(period.strokes - zeros[: boom.plan.joints])
+            readings = period.times, period.channels, period.values - zeros[period.channels]
+
+            def filtered(loads: Array, sensors: Array, zero2: Array) -> tuple[Array, Array]:
+                found, ends = np.empty((len(period.times), 2)), np.empty(len(zero2))
+                own, axes = (boom.posture, boom.filters), (self._gravity, scene.base.inclination)
+                filter_rest(*own, loads, zero2, *axes, *readings, sensors, found, ends)
+                return found, ends
+
+            return filtered
+
+        return at_rest
+
+    def noise(self, deviations: Array, sensors: Array) -> Noise:
+        """Return the noise with the load of each rest period at its greatest likelihood; `sensors` (c,) is kept."""
+        trial, bounds = self.values(deviations), np.log(np.array(LOADS) * self._weight)
+
+        def most_likely(period: RestPeriod) -> Array:
+            filtered = self._boom_at(trial)(period)
+
+            def cost(sizes: Array) -> float:
+                return likelihood_cost(filtered(np.exp(2.0 * sizes), sensors, self._zero2)[0])
+
+            exact = {"xatol": 0.15}  # of the logarithm of the size
+            both = minimize_scalar(lambda size: cost(np.full(2, size)), bounds=bounds, method="bounded", options=exact).x
+            options = exact | {"fatol": 0.5, "initial_simplex": both + np.array([[0.0, 0.0], [-1.0, 0.0], [0.0, -1.0]])}
+            found = minimize(cost, np.full(2, both), method="Nelder-Mead", bounds=[tuple(bounds)] * 2, options=options).x
+            return np.asarray(np.exp(2.0 * found))
+
+        with ThreadPoolExecutor(usable_cores()) as pool:
+            return Noise(np.array(list(pool.map(most_likely, self._periods))), sensors)
+
+    def slopes(self, deviations: Array, noise: Noise, base: Array) -> Array:
+        """Return derivatives of innovations and variances by the unknowns, (p, r, 2); `base` is at `deviations`."""
+        steps = DIFFERENCE * np.eye(len(deviations))
+        trials = (self.values(deviations + step) for step in steps)
+        return np.array([(found - base) / DIFFERENCE for found in self.innovations(trials, noise)])
+
+    def slopes_by_model(self, deviations: Array, assumed: Sequence[Unknown], noise: Noise, base: Array) -> Array:
+        """Return the same by parameters that are taken to be known, in the deviations that they may be wrong by."""
+        own = self.values(deviations)
+        trials = (own | {each.name: each.value(DIFFERENCE)} for each in assumed)
+        return np.array([(found - base) / DIFFERENCE for found in self.innovations(trials, noise)]).reshape(-1, *base.shape)
+
+
+def likelihood_cost(found: Array) -> float:
+    """Return the negative log likelihood of innovations and variances (r, 2), up to a constant."""
+    return float(0.5 * np.sum(found[:, 0] ** 2 / found[:, 1] + np.log(found[:, 1])))
+
+
 MOST = 12  # passes
-HALVINGS = 5  # of a step that makes the fit worse
-LARGEST = 1.0  # standard deviations of the prior, of a step
-ENOUGH = 0.1  # standard deviations of the estimate, of a step
-NEAR = 1.0  # standard deviations of the estimate, of a step, from which on the noise is no more learnt
 
 
 @dataclass(frozen=True)
@@ -82,13 +218,13 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callab
         slopes = problem.slopes(at, noise, base)
         score, information = _score(slopes, base)
         precision, pull = information + np.eye(len(at)), score.sum(axis=1) - at
-        if furthest < ENOUGH or passes == MOST:
+        if furthest < 0.1 or passes == MOST:  # of the deviation of an estimate
             break
         step = bounded_minimum(precision, pull, problem.least - at)
-        step /= max(1.0, float(np.abs(step).max()) / LARGEST)
+        step /= max(1.0, float(np.abs(step).max()))  # one deviation of a prior at most
         step = _shortened(problem, at, step, noise, base)
         at, furthest = at + step, float((np.abs(step) / np.sqrt(np.diag(np.linalg.inv(precision)))).max())
-        if learning and furthest < NEAR:
+        if learning and furthest < 1.0:  # near enough to learn the noise for the last time
             noise = problem.noise(at, np.maximum(stated, stated * _mean_squares(problem, base)))
             learning = False
     sums = np.array([np.bincount(problem.blocks, row) for row in score])
@@ -99,7 +235,7 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callab
 
 def _shortened(problem: CalibrationProblem, at: Array, step: Array, noise: Noise, base: Array) -> Array:
     before = likelihood_cost(base) + 0.5 * at @ at
-    for _ in range(HALVINGS):
+    for _ in range(5):
         (found,) = problem.innovations([problem.values(at + step)], noise)
         if likelihood_cost(found) + 0.5 * (at + step) @ (at + step) <= before:
             break
@@ -129,9 +265,6 @@ def _together(slopes: Array, others: Array, base: Array) -> Array:
     return np.asarray(innovations + 0.5 * (slopes[:, :, 1] / variance**2) @ others[:, :, 1].T)
 
 
-TOGETHER = 0.7  # correlation from which on two unknowns count as one group
-
-
 @dataclass(frozen=True)
 class InseparableUnknowns:
     """Unknowns that the sessions cannot tell apart or determine; one alone: the sessions do not show it."""
@@ -150,7 +283,7 @@ def groups_of(problem: CalibrationProblem, fit: Fit) -> list[InseparableUnknowns
     covariance = fit.covariance()
     spread = np.sqrt(np.diag(covariance))
     vague = spread > np.array([unknown.kind.useful / unknown.kind.prior for unknown in problem.unknowns])
-    tied = np.abs(covariance) > TOGETHER * np.outer(spread, spread)
+    tied = np.abs(covariance) > 0.7 * np.outer(spread, spread)
     groups, left = [], set(np.flatnonzero(vague).tolist())
     while left:
         group: set[int] = set()

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..bag.session_sheet import kept
-from ..config.yaml_text import plain, with_value, yaml_text
+from ..bag.session_model import kept
+from ..config.yaml_text import with_values
 from ..errors import UsageError
 from ..messages.mapping import load_mapping
 from ..messages.topic_table import factor
@@ -25,14 +25,9 @@ def mapping_path(out: Path) -> Path:
     return out.with_suffix(".mapping.yaml")
 
 
-def picture_paths(out: Path) -> list[Path]:
-    """Return the paths of the pictures that go with a scene: residuals, and parameters."""
-    return [out.with_suffix(".residuals.png"), out.with_suffix(".parameters.png")]
-
-
 def refuse_overwriting(out: Path, sources: Sequence[Path], force: bool) -> None:
     """Raise UsageError if a file of the result exists, or would replace one of `sources` or a file of a recording."""
-    for path in (out, mapping_path(out), *picture_paths(out)):
+    for path in (out, mapping_path(out)):
         check_target(path, sources)
         if path.exists() and not force:
             raise UsageError(f"{path}: is there already. Name another file, or add --force to replace it.")
@@ -67,12 +62,7 @@ def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path
     if not found.zeros:
         return None
     text, zeros = _mapping_text(bag, mapping), _in_readings(found, joints)
-    if "sensors" in (plain(text) or {}):
-        for name, zero in zeros.items():
-            text = with_value(text, ("sensors", name, "zero"), zero)
-    else:
-        rows = [f"  {name}: {yaml_text({'zero': zero})}" for name, zero in zeros.items()]
-        text = "\n".join([*([text.rstrip()] if text.strip() else []), "sensors:", *rows]) + "\n"
+    text = with_values(text, [(("sensors", name, "zero"), zero) for name, zero in zeros.items()])
     head = f"# Zeros of {', '.join(zeros)}: calibrated {credit}.\n"
     path = mapping_path(out)
     write_atomic(path, head + text)
@@ -146,14 +136,9 @@ def as_object(found: Calibration) -> dict[str, Any]:
     }
 
 
-def shown(estimate: Estimate) -> tuple[float, str]:
-    """Return the factor from SI, and the unit, in which a parameter is shown."""
-    unit = estimate.unknown.kind.unit
-    return SHOWN.get(unit, (1.0, unit)) if estimate.unknown.channel else (1.0, unit)
-
-
 def _row(estimate: Estimate) -> tuple[str, str, str, str, str]:
-    factor, unit = shown(estimate)
+    unit = estimate.unknown.kind.unit
+    factor, unit = SHOWN.get(unit, (1.0, unit)) if estimate.unknown.channel else (1.0, unit)
     values = (estimate.unknown.present, estimate.value, estimate.low, estimate.high)
     before, now, low, high = (factor * value for value in values)
     interval = f"{low:.4g} to {high:.4g} {unit}"

@@ -2,47 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import Mapped, mapping_of, strokes_of
-from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..scene.edit import with_parameters
 from ..scene.schema import Scene
-from ..types import SENSORS, Stream, StrokeReading
-from .fit import Fit, InseparableUnknowns, fitted, groups_of
-from .problem import CalibrationProblem
-from .rest_periods import STREAMS, Rigging, rest_periods
-from .sessions import MeasuredSession, read_sessions
-from .unknowns import Unknown, assumed_of, unknowns_of, usual_names
-from .validation import HeldOutResult, judged
+from ..twin.twin import Twin
+from ..types import NANO, SENSORS, Array, Residuals, Stream, StrokeReading
+from .fit import CalibrationProblem, Fit, InseparableUnknowns, fitted, groups_of
+from .sessions import STREAMS, MeasuredSession, Rigging, read_sessions, rest_periods
+from .unknowns import Choice, Unknown, assumed_of, unknowns_of, usual_names
 
-KEPT = 2.0 / 3.0  # of a single session is fitted, the rest held out
 BEYOND = 0.01  # m, by which a stroke may be beyond the travel of its cylinder
-MISFIT = 1.5  # of a channel, from which on it is remarked on
-GROWN = 1.1  # of residuals on what was held out, likewise
 BETWEEN = 1.96  # deviations, of a normal distribution's 95 %
 
 Progress = Callable[[float, str], None]
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Unknowns to estimate: `names`, or if there are none the usual ones and those requested by the other fields.
-
-    See `boom_twin.calibration.unknowns.usual_names`.
-    """
-
-    names: tuple[str, ...] = ()
-    load: str | None = None
-    damping: str | None = None
-    stiffness: bool = False
-    zeros: str = "all"
 
 
 @dataclass(frozen=True)
@@ -59,6 +40,21 @@ class Estimate:
     def has_changed(self) -> bool:
         """Return True if the sessions determine it, and the present value is outside the interval."""
         return self.told and not self.low <= self.unknown.present <= self.high
+
+
+@dataclass(frozen=True)
+class HeldOutResult:
+    """Residuals of k samples in c channels, NaN where not measured."""
+
+    names: tuple[str, ...]
+    times: Array  # (k,), s after the first of them
+    values: Array  # (k, c), in the unit of the sensor
+    sigmas: Array  # (k, c), expected
+
+    @property
+    def spread(self) -> Array:
+        """Root mean square of the normalised residuals of every channel, shape (c,); 1 if they are as expected."""
+        return np.array([_rms(column) for column in (self.values / self.sigmas).T])
 
 
 @dataclass(frozen=True)
@@ -136,7 +132,7 @@ def calibrate(
     sessions = read_sessions(paths, topics, joints, window)
     _refuse_other_boom(scene, sessions)
     present = [stream for stream in Stream if any(stream in session.series for session in sessions)]
-    names = choice.names or usual_names(scene, present, choice.load, choice.damping, choice.stiffness, choice.zeros)
+    names = choice.names or usual_names(scene, present, choice)
     unknowns = unknowns_of(scene, names)
     kept_from, fitting = _parts(sessions)
     progress(0.05, "rests")
@@ -199,7 +195,7 @@ def _parts(sessions: Sequence[MeasuredSession]) -> tuple[int, list[tuple[Measure
     strokes = sessions[-1].series[Stream.STROKES].stamps
     if len(sessions) > 1:
         return int(strokes[0]), [(session, None) for session in sessions[:-1]]
-    until = int(strokes[0] + KEPT * (strokes[-1] - strokes[0]))
+    until = int(strokes[0] + 2.0 / 3.0 * (strokes[-1] - strokes[0]))
     return until, [(sessions[0], until)]
 
 
@@ -229,10 +225,46 @@ def _estimates(problem: CalibrationProblem, fit: Fit, groups: Sequence[Inseparab
     return tuple(found)
 
 
+def judged(
+    scene: Scene,
+    rigging: Rigging,
+    session: MeasuredSession,
+    zeros: Mapping[str, float],
+    start: int,
+) -> HeldOutResult:
+    """Run a session, less the sensors' `zeros`, through the twin of `scene`; keep the residuals from stamp `start` on.
+
+    BagError if the twin predicts nothing there.
+    """
+    twin = Twin(scene, rigging.settings, rigging.mounts, reads=rigging.reads, places=rigging.places)
+    found: dict[Stream, list[Residuals]] = {stream: [] for stream in Stream}
+    for sample in session.samples(zeros):
+        for residuals in (each for report in twin.update(sample).all for each in report.residuals):
+            if residuals.stamp >= start:
+                found[residuals.stream].append(residuals)
+    every = [residuals for group in found.values() for residuals in group]
+    if not every:
+        raise BagError(f"{session.name}: the twin predicts nothing in the part held out. Are the strokes within the travel?")
+    first = min(residuals.stamp for residuals in every)
+    names = tuple(name for group in found.values() if group for name in group[0].names)
+    times = np.array([(residuals.stamp - first) * NANO for residuals in every])
+    values, sigmas = np.full((2, len(every), len(names)), np.nan)
+    for row, residuals in enumerate(every):
+        at = names.index(residuals.names[0])
+        values[row, at : at + len(residuals.names)] = residuals.values
+        sigmas[row, at : at + len(residuals.names)] = residuals.sigmas
+    return HeldOutResult(names, times, values, sigmas)
+
+
+def _rms(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+
+
 def _worse(before: HeldOutResult, after: HeldOutResult) -> str:
     """Return which residuals have grown on what was held out, and the remedy; empty if none has."""
     worse = [
-        name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > GROWN * max(old, 1.0)
+        name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > 1.1 * max(old, 1.0)
     ]
     if not worse:
         return ""
@@ -252,7 +284,7 @@ def _remarks(fit: Fit, names: Sequence[str], estimates: Sequence[Estimate], sess
                 "less, which no boom has. Check the zeros of the sensors and the other loads of the scene."
             )
     for name, misfit in zip(names, fit.misfits, strict=True):
-        if misfit > MISFIT:
+        if misfit > 1.5:
             found.append(
                 f"The readings of {name} are {misfit:.1f} times as far from the fit as its noise explains. The sessions hold "
                 "something that the parameters cannot make, as a fault of the sensor or another boom. It has the less weight."

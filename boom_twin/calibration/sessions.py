@@ -1,27 +1,30 @@
-"""Measured sessions as arrays."""
+"""Measured sessions as arrays, and their rest periods: when no valve is open, and what all sensors read meanwhile."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from heapq import merge
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bag.joint_names import refuse_other_names
+from ..bag.advice import refuse_conflicts
 from ..bag.reader import Session, check_topic, files_sha256, scan
-from ..bag.time_window import WHOLE, TimeWindow
-from ..errors import BagError
+from ..bag.session_file import WHOLE, TimeWindow
+from ..config.settings import Settings
+from ..deviation.predictor import BoomPredictor
+from ..errors import BagError, SolverError
+from ..kernels.tables import OK, SENTENCES
 from ..messages.topic_table import Topics
 from ..offline.session_samples import SessionSamples
-from ..types import SENSORS, Array, Change, Sample, Stream, channels_of
+from ..scene.schema import Scene
+from ..types import NANO, SECOND, SENSORS, Array, Change, Mount, Place, Sample, Stream, StrokeReading, channels_of
+from .rest_filter import note_drives
 
-NEEDED = (Stream.STROKES,)  # streams without which nothing can be estimated
-SHOWN = 12  # hex digits of a hash
 LOADS = ("payload", "line_fill")
-MISSING = 0.5  # largest share of values of a channel that may be missing
 
 
 @dataclass(frozen=True)
@@ -62,20 +65,20 @@ def read_sessions(paths: Sequence[Path], topics: Topics, joints: int, window: Ti
     """Read sessions, the same window of each; BagError for one of another boom, without its strokes, or that cannot be read."""
     sessions = [scan(path) for path in paths]
     for session in sessions:
-        refuse_other_names(session, topics, joints)
+        refuse_conflicts(session, topics, joints)
     wanted = [_wanted(session, topics) for session in sessions]
     pairs = zip(sessions, wanted, strict=True)
     return [_measured(each, SessionSamples(each, topics, names, joints, window), joints) for each, names in pairs]
 
 
 def _wanted(session: Session, topics: Topics) -> list[str]:
-    """Return the topics of the streams of `NEEDED`, which must be there, and of the others if they are."""
+    """Return the topics of strokes, which must be there, and of the other streams if they are."""
     names = []
     for stream, topic in topics.inputs.items():
         found = session.find(topic.name)
-        if stream in NEEDED:
+        if stream is Stream.STROKES:
             check_topic(session, topic.name, topic.type)
-        if stream in NEEDED or (found is not None and found.count and topic.name in topics.heard):
+        if stream is Stream.STROKES or (found is not None and found.count and topic.name in topics.heard):
             names.append(topic.name)
     return list(dict.fromkeys(names))
 
@@ -89,19 +92,19 @@ def _measured(session: Session, samples: SessionSamples, joints: int) -> Measure
         elif sample is not None:
             found[sample.stream].append(sample)
     series = {stream: _series(group) for stream, group in found.items() if group}
-    for stream in NEEDED:
-        if stream not in series:
-            raise BagError(
-                f"{session.path}: no usable value of {SENSORS[stream].named}_1..{joints} (met: {_told(samples)}). "
-                "Is it a session of this boom? If its sensors have other names, give a mapping."
-            )
-    lacking = [f"cylinder_{i + 1}" for i in np.flatnonzero(np.isnan(series[Stream.STROKES].values).mean(axis=0) > MISSING)]
+    if Stream.STROKES not in series:
+        met = ", ".join(f"{name}: {count}" for name, count in samples.oddities.items()) or "nothing"
+        raise BagError(
+            f"{session.path}: no usable value of {SENSORS[Stream.STROKES].named}_1..{joints} (met: {met}). "
+            "Is it a session of this boom? If its sensors have other names, give a mapping."
+        )
+    lacking = [f"cylinder_{i + 1}" for i in np.flatnonzero(np.isnan(series[Stream.STROKES].values).mean(axis=0) > 0.5)]
     if lacking:
         raise BagError(
             f"{session.path}: {', '.join(lacking)}: more than half of the values are missing. The scene has {joints} "
             "cylinders: give a session of this boom."
         )
-    return MeasuredSession(session.path.resolve().name, files_sha256(session)[:SHOWN], series, changed)
+    return MeasuredSession(session.path.resolve().name, files_sha256(session)[:12], series, changed)
 
 
 def _series(samples: list[Sample]) -> Series:
@@ -109,5 +112,107 @@ def _series(samples: list[Sample]) -> Series:
     return Series(stamps, np.array([samples[i].values for i in first]))
 
 
-def _told(samples: SessionSamples) -> str:
-    return ", ".join(f"{name}: {count}" for name, count in samples.oddities.items()) or "nothing"
+STREAMS = (Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES)  # compared, in the order of the channels
+LEAD, TAIL = 0.3, 0.4  # s, left out after valves closed, and before one is believed open
+TRAVEL = 2e-4  # m, of a drive, which ends a rest period
+SHORTEST, RESTED = 1.5, 5.0  # s, of a rest period, and of all of them
+
+
+@dataclass(frozen=True)
+class Rigging:
+    """How the sensors of the sessions are mounted, what they read, and their noise."""
+
+    settings: Settings
+    mounts: tuple[Mount | None, ...]
+    reads: StrokeReading
+    places: Mapping[str, Place] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RestPeriod:
+    """Readings while no drive moves."""
+
+    start: float  # s since the first stroke sample of the session
+    times: Array  # (r,), s after the period began, ascending
+    channels: NDArray[np.int64]  # (r,), places in `channel_names`
+    values: Array  # (r,), SI; finite
+    strokes: Array  # (n,), mean readings of the stroke transducers, m
+
+
+def channel_names(joints: int) -> tuple[str, ...]:
+    """Return the names of the channels that are compared."""
+    return tuple(name for stream in STREAMS for name in channels_of(joints)[stream])
+
+
+def rest_periods(
+    session: MeasuredSession,
+    scene: Scene,
+    rigging: Rigging,
+    until: int | None = None,
+) -> list[RestPeriod]:
+    """Return the rest periods of a session up to the stamp `until` (ns).
+
+    BagError if it rests too little, SolverError if the boom has no equilibrium at its strokes.
+    """
+    boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads, rigging.places)
+    strokes = session.series[Stream.STROKES]
+    if until is not None:
+        strokes = strokes.of(0, until)
+    found = [_period(session, *span) for part in _without_gaps(strokes) for span in _rests(boom, part)]
+    rested = sum(float(period.times[-1]) for period in found)
+    if rested < RESTED:
+        raise BagError(
+            f"{session.name}: the boom rests for {rested:.1f} s in the part that is fitted, in periods of {SHORTEST:g} s or "
+            f"more; {RESTED:g} s are needed. Record a minute of moves with rests of 3 s and more between them."
+        )
+    return found
+
+
+def _without_gaps(strokes: Series) -> list[Series]:
+    """Return the stretches between gaps, each from its first complete reading on."""
+    cuts = np.flatnonzero(np.diff(strokes.stamps) * NANO > 0.5) + 1  # s
+    found = []
+    for first, last in pairwise([0, *cuts, len(strokes.stamps)]):
+        complete = np.flatnonzero(np.isfinite(strokes.values[first:last]).all(axis=1))
+        if len(complete):
+            found.append(Series(strokes.stamps[first + complete[0] : last], strokes.values[first + complete[0] : last]))
+    return found
+
+
+def _rests(boom: BoomPredictor, strokes: Series) -> list[tuple[int, int]]:
+    boom.start(strokes.values[0], may_move=True)
+    t, anchor, live, work, posture, filters, _, row = boom.compiled
+    drives, opened = np.zeros(strokes.values.shape), np.zeros(len(strokes.stamps), np.bool_)
+    given = strokes.stamps, strokes.values, np.array(boom.plan.tables.gravity), row, drives, opened
+    status = note_drives(t, anchor, live, work, posture, filters, *given)
+    if status != OK:
+        raise SolverError(SENTENCES[int(status)])
+    found, first = [], 0
+    for k, is_open in enumerate([*opened.tolist(), True]):
+        if is_open or np.abs(drives[k] - drives[first]).max() > TRAVEL:
+            start = int(strokes.stamps[min(first, k - 1)]) + round(LEAD * SECOND)
+            stop = int(strokes.stamps[k - 1]) - (round(TAIL * SECOND) if k < len(opened) else 0)
+            if k > first and stop - start >= SHORTEST * SECOND:
+                found.append((start, stop))
+            first = k + 1 if is_open else k
+    return found
+
+
+def _period(session: MeasuredSession, start: int, stop: int) -> RestPeriod:
+    stamps, channels, values, first = [], [], [], 0
+    joints = session.series[Stream.STROKES].values.shape[1]
+    for stream in STREAMS:
+        width = len(channels_of(joints)[stream])
+        if stream in session.series:
+            part = session.series[stream].of(start, stop)
+            stamps.append(np.repeat(part.stamps, width))
+            channels.append(np.tile(np.arange(first, first + width), len(part.stamps)))
+            values.append(part.values.ravel())
+        first += width
+    at, channel, value = (np.concatenate(each) for each in (stamps, channels, values))
+    known = np.flatnonzero(np.isfinite(value))
+    order = known[np.argsort(at[known], kind="stable")]
+    mean = np.nanmean(session.series[Stream.STROKES].of(start, stop).values, axis=0)
+    times: Array = np.asarray((at[order] - start) * NANO)
+    begin = (start - int(session.series[Stream.STROKES].stamps[0])) * NANO
+    return RestPeriod(begin, times, channel[order].astype(np.int64), value[order].astype(float), mean)

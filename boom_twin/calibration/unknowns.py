@@ -12,9 +12,6 @@ from ..scene.edit import parameter, parameter_names
 from ..scene.schema import Scene
 from ..types import Stream, channels_of, stream_of
 
-LEVER = 0.3  # m, of a cylinder about its joint
-LEAST_LOAD = 1e-3  # kg, kg/m; a load of nothing is another model
-
 
 @dataclass(frozen=True, slots=True)
 class UnknownKind:
@@ -42,7 +39,7 @@ KINDS = {
 
 ZEROS = {
     Stream.ANGLES: UnknownKind("rad", math.radians(2.0), math.radians(0.05), least=ANGLE_ZERO),
-    Stream.STROKES: UnknownKind("m", 0.01, 5e-4, least=LEVER * ANGLE_ZERO),
+    Stream.STROKES: UnknownKind("m", 0.01, 5e-4, least=0.3 * ANGLE_ZERO),  # m, a lever
     Stream.IMU: UnknownKind("m/s^2", 0.3, 0.03),
 }
 """Kinds of the sensors' zeros, by stream, in the order in which they are estimated."""
@@ -81,8 +78,8 @@ class Unknown:
 
     @property
     def least(self) -> float:
-        """Lower bound in deviations from the present value; loads cannot be negative."""
-        return (LEAST_LOAD - self.present) / self.kind.prior if self.name in ("tip.payload", "line_fill") else -math.inf
+        """Lower bound in deviations from the present value; loads are 0.001 at least, for none is another model."""
+        return (1e-3 - self.present) / self.kind.prior if self.name in ("tip.payload", "line_fill") else -math.inf
 
     def value(self, deviation: float) -> float:
         """Return the value at `deviation` prior deviations from the present one."""
@@ -90,24 +87,23 @@ class Unknown:
         return self.present * math.exp(step) if self.kind.relative else self.present + step
 
 
-def usual_names(
-    scene: Scene,
-    streams: Sequence[Stream],
-    load: str | None = None,
-    damping: str | None = None,
-    stiffness: bool = False,
-    zeros: str = "all",
-) -> list[str]:
-    """Return the default unknowns: stiffness of every cylinder, zero of every sensor of `streams`, and those requested.
+@dataclass(frozen=True)
+class Choice:
+    """Unknowns to estimate: `names`, or if there are none the usual ones and those requested by the other fields."""
 
-    `load` is payload or line_fill; `damping` d (cylinders) or beta (sections); `stiffness` adds that of sections in bending
-    and of an elastic base; `zeros` are all, angles (all but those of stroke transducers, which are then taken to be right) or
-    none.
-    """
-    ends = [".k", *([f".{damping}"] if damping else []), *([".EI", ".stiffness"] if stiffness else [])]
+    names: tuple[str, ...] = ()
+    load: str | None = None  # payload or line_fill
+    damping: str | None = None  # d (cylinders) or beta (sections)
+    stiffness: bool = False  # of sections in bending, and of an elastic base
+    zeros: str = "all"  # all, angles (stroke transducers are then taken to be right) or none
+
+
+def usual_names(scene: Scene, streams: Sequence[Stream], choice: Choice) -> list[str]:
+    """Return the default unknowns: stiffness of every cylinder, zero of every sensor of `streams`, and those of `choice`."""
+    ends = [".k", *([f".{choice.damping}"] if choice.damping else []), *([".EI", ".stiffness"] if choice.stiffness else [])]
     names = [name for end in ends for name in parameter_names(scene) if name.endswith(end)]
-    names += {None: [], "payload": ["tip.payload"], "line_fill": ["line_fill"]}[load]
-    trusted = {"all": (), "angles": (Stream.STROKES,), "none": tuple(Stream)}[zeros]
+    names += {None: [], "payload": ["tip.payload"], "line_fill": ["line_fill"]}[choice.load]
+    trusted = {"all": (), "angles": (Stream.STROKES,), "none": tuple(Stream)}[choice.zeros]
     return names + zero_names(scene, [stream for stream in streams if stream not in trusted])
 
 

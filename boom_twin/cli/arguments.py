@@ -12,7 +12,7 @@ from ..errors import UsageError
 from ..types import Place, Stream
 
 if TYPE_CHECKING:
-    from ..bag.time_window import TimeWindow
+    from ..bag.session_file import TimeWindow
     from ..scene.schema import Scene
 
 
@@ -57,7 +57,7 @@ def add_session(parser: ArgumentParser, params: bool = True, mapping: bool = Tru
 
 def window_of(args: Namespace) -> TimeWindow:
     """Return the part of a session that the arguments name."""
-    from ..bag.time_window import TimeWindow
+    from ..bag.session_file import TimeWindow
 
     return TimeWindow(args.start, args.duration)
 
@@ -151,33 +151,26 @@ def named_places(kind: str, texts: Sequence[str], scene: Scene) -> dict[str, Pla
     return dict(zip(names, places, strict=False))
 
 
-PLACED = ("imu", "gyro", "moment", "point")
-
-
 def placed_sensors_of(text: str, scene: Scene) -> list[tuple[str, Stream, dict[str, Place]]]:
     """Return name, stream and place of the sensors between commas; those with a place are written as imu@`PLACE`.
 
-    UsageError: see `sensors_of` and `named_places`.
+    UsageError: see `sensors_of` and `named_places`. A gyro is part of the IMU at its place.
     """
     names = [name.strip() for name in text.split(",") if name.strip()]
-    sensors_of(",".join(name for name in names if name.partition("@")[0] not in PLACED or "@" not in name))
+    parts = [name.partition("@")[::2] for name in names]
+    sensors_of(",".join(kind for kind, at in parts if not at or kind not in ("imu", "gyro", "moment", "point")))
     placed: dict[tuple[str, str], tuple[str, Place]] = {}  # name and place by kind and text
-    for kind in ("imu", "moment", "point"):
-        texts = list(dict.fromkeys(at for name in names if _placed(name)[0] == kind and (at := _placed(name)[1])))
-        placed |= {(kind, at): found for at, found in zip(texts, named_places(kind, texts, scene).items(), strict=True)}
+    for kind, kinds in (("imu", ("imu", "gyro")), ("moment", ("moment",)), ("point", ("point",))):
+        texts = list(dict.fromkeys(at for own, at in parts if at and own in kinds))
+        found = zip(texts, named_places(kind, texts, scene).items(), strict=True)
+        placed |= {(own, at): named for at, named in found for own in kinds}
     chosen = []
-    for name in names:
-        stem, place = placed.get(_placed(name), ("", None))
-        end = "_rate" if name.startswith("gyro") else ""
-        stream = Stream.MOMENTS if name.startswith("moment") else Stream(stem + end) if stem else SENSORS[name]
+    for name, part in zip(names, parts, strict=True):
+        stem, place = placed.get(part, ("", None))
+        end = "_rate" if part[0] == "gyro" else ""
+        stream = Stream.MOMENTS if stem.startswith("moment") else Stream(stem + end) if stem else SENSORS[name]
         chosen.append((name, stream, {stem: place} if place else {}))
     return chosen
-
-
-def _placed(name: str) -> tuple[str, str]:
-    """Return kind and place of a sensor; a gyro is part of an IMU."""
-    kind, _, at = name.partition("@")
-    return "imu" if kind == "gyro" else kind, at
 
 
 def positive(text: str) -> float:

@@ -15,7 +15,7 @@ from .arguments import add_session, at_least, positive, window_of
 from .output import tell, warn
 
 if TYPE_CHECKING:
-    from ..batch.results import BatchFolder
+    from ..batch.folder import BatchFolder
     from ..batch.session_task import Row, SessionTask
 
 
@@ -45,10 +45,9 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Replay what is not done yet, and write the table of all; exit code 1 if a session failed."""
-    from ..batch.cluster import REMEDY, connected, rows_of
-    from ..batch.results import PAGE, RIGS, TABLE, batch_folder, counts, write_page, write_rigs, write_table
-    from ..batch.rigs import rigs_of
-    from ..batch.sources import sessions_of
+    from ..batch.folder import PAGE, RIGS, TABLE, batch_folder, sessions_of, write_table
+    from ..batch.results import counts, rigs_of, write_page, write_rigs
+    from ..batch.session_task import REMEDY, connected, rows_of
 
     if missing := [name for name in ("pyarrow", "psutil") if find_spec(name) is None]:
         raise UsageError(f"{missing[0]} is not installed, and batch needs it. {REMEDY}")
@@ -87,8 +86,8 @@ def run(args: Namespace) -> int:
 
 def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> list[SessionTask]:
     from .. import __version__
+    from ..batch.folder import fingerprint, key_of
     from ..batch.session_task import SessionTask
-    from ..batch.sources import fingerprint, key_of
     from ..system.received_files import sha256_of
 
     given = {name: getattr(args, name) for name in ("scene", "params", "mapping")}

@@ -16,7 +16,7 @@ from .output import open_session_scene, open_session_settings, print_result, war
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
-    from ..calibration.run import Calibration, Progress
+    from ..calibration.run import Progress
     from ..offline.progress import ProgressBar
 
 
@@ -34,7 +34,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_session(parser)
     parser.add_argument("--date", metavar="DATE", help="for the provenance; today if not given")
     parser.add_argument("--force", action="store_true", help="replace files of the result that are there already")
-    parser.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
     add_json(parser)
 
 
@@ -42,7 +41,8 @@ def run(args: Namespace) -> int:
     """Run the calibration, write the scene and print the result; exit code 1 if it must not be used."""
     from ..bag.reader import scan
     from ..calibration.output import as_object, as_text, mapping_path, refuse_overwriting, write_mapping, write_scene
-    from ..calibration.run import Choice, calibrate
+    from ..calibration.run import calibrate
+    from ..calibration.unknowns import Choice
 
     sources = files_of(args, "bags", "scene", "params", "mapping")
     refuse_overwriting(args.out, sources, args.force)
@@ -61,7 +61,7 @@ def run(args: Namespace) -> int:
     write_scene(found, scene.scene, scene.text, args.out, credit)
     if mapping is None and (earlier := mapping_path(args.out)).exists():
         warn(f"{earlier}: of an earlier calibration; {args.out} has no zeros of its own.")
-    files = [args.out, *([mapping] if mapping else []), *([] if args.no_pictures else _draw(found, args.out))]
+    files = [args.out, *([mapping] if mapping else [])]
     written = [str(path) for path in files]
     print_result(args.json, as_object(found) | {"wall_s": wall, "files": written}, [*as_text(found), f"{wall:.1f} s", *written])
     for bag in args.bags:
@@ -92,25 +92,3 @@ def _moving(bar: ProgressBar) -> Progress:
         done = 100.0 * share
 
     return progress
-
-
-def _draw(found: Calibration, out: Path) -> list[Path]:
-    from ..calibration.output import picture_paths, shown
-    from ..plots.session import Interval, held_out_picture, parameters_picture
-
-    note = f"held out: {found.held_out}"
-    judged = (found.before, found.after)
-    paths = picture_paths(out)
-    times = (found.before.times, found.after.times)
-    normalised = (found.before.values / found.before.sigmas, found.after.values / found.after.sigmas)
-    held_out_picture(paths[0], f"{out.name}: residuals of the twin", note, judged[0].names, times, normalised)
-    intervals = []
-    for estimate in found.estimates:
-        factor, unit = shown(estimate)
-        before, *found_values = (factor * v for v in (estimate.unknown.present, estimate.value, estimate.low, estimate.high))
-        if estimate.unknown.kind.relative:
-            unit, found_values, before = "change, %", [100.0 * (value / before - 1.0) for value in found_values], 0.0
-        now, low, high = found_values
-        intervals.append(Interval(estimate.unknown.name, unit, before, now, low, high, estimate.told))
-    parameters_picture(paths[1], f"{out.name}: parameters", note, intervals)
-    return paths

@@ -20,14 +20,12 @@ from ..system.atomic_files import check_target
 from ..types import Place, Stream, StrokeReading
 from . import reduce as need
 from .arguments import PLACE, SENSORS, add_file, add_json, add_scene, files_of, placed_sensors_of
-from .output import columns, open_scene, print_result, tell
+from .output import columns, print_result, tell
 
 if TYPE_CHECKING:
     from ..deviation.accuracy import TipAccuracy
 
 PNG = b"\x89PNG"  # first bytes of a picture; only such a file is replaced
-SIZE_A = "angle of the section, cylinder force"
-SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -57,7 +55,11 @@ def run(args: Namespace) -> int:
     if args.drive == "angles" and any(stream is Stream.ANGLES for _, stream, _ in sensors or ()):
         raise UsageError("--sensors angles: they drive the model. Name the sensors beside them.")
     name = args.scene or DEFAULT_NAME
-    drawn = [] if args.picture is None else [f"Written: {_draw(args.picture, scene, name)}"]
+    drawn = []
+    if args.picture is not None:
+        from ..plots.boom import joint_ranges_picture
+
+        drawn = [f"Written: {joint_ranges_picture(args.picture, scene, Path(name).name)}"]
     if args.strict and any(not oddity.is_note for oddity in oddities):
         for line in drawn:  # the picture shows what the warnings are about
             tell(line)
@@ -65,7 +67,7 @@ def run(args: Namespace) -> int:
     account = explain(scene)
     values, lines = summary(name, account, oddities) | _restitutions(scene), report(name, scene, account, oddities)
     if args.need is not None:
-        result = need.search(scene, args.need, None if args.against is None else open_scene(args.against))
+        result = need.search(scene, args.need)
         values |= need.summary(result, args.need)
         lines += need.report(scene, result, args.need)
         if args.out is not None:
@@ -77,12 +79,6 @@ def run(args: Namespace) -> int:
         lines += rows
     print_result(args.json, values, lines + drawn)
     return 0
-
-
-def _draw(path: Path, scene: Scene, name: str) -> Path:
-    from ..plots.joint_ranges import joint_ranges_picture
-
-    return joint_ranges_picture(path, scene, Path(name).name)
 
 
 def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str, Any]:
@@ -112,7 +108,6 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "lever_greatest_m": [joint.linkage.lever[1] for joint in joints],
         "transmission_least_deg": [joint.linkage.transmission_deg for joint in joints],
         "nearest_pins_m": [None if joint.linkage.nearest is None else joint.linkage.nearest.distance for joint in joints],
-        "over_pivot": [", ".join(joint.linkage.over_pivot) for joint in joints],
         "oil_stiffness_N_m": [list(joint.k_over_stroke) for joint in joints],
         "left_out": [f"{item.key}: {item.meaning}" for item in account.left_out],
         "warnings": [str(oddity) for oddity in oddities if not oddity.is_note],
@@ -139,14 +134,14 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_masses(account)]
     lines += ["", "Sections", *_sections(account)]
     lines += ["", "Joints and cylinders", *_cylinders(account)]
-    lines += ["", "Joints over their range: lever of the cylinder, angle of the links, pins, what runs over the pivot"]
+    lines += ["", "Joints over their range: lever of the cylinder, angle of the links, nearest pins"]
     lines += _linkages(account)
     if any(joint.k_over_stroke for joint in account.joints):
         lines += ["", "Stiffness of the oil over the stroke, kN/mm", *_over_stroke(account)]
     if scene.clearance is not None and account.pins:
         lines += ["", _clearance_title(scene.clearance), *_pins(account)]
     lines += ["", "Left out of the model (absent from the scene, zero or false)", *_left_out(account)]
-    lines += ["", "Unknowns per step", *_unknowns(account)]
+    lines += ["", f"Unknowns per step: {account.unknowns}", *_unknowns(account)]
     warnings = [oddity for oddity in oddities if not oddity.is_note]
     lines += ["", *(f"Note: {oddity}" for oddity in oddities if oddity.is_note)]
     lines += [f"Warnings: {len(warnings) or 'none'}", *(f"  {warning}" for warning in warnings)]
@@ -215,15 +210,15 @@ def _oil(joint: JointAccount) -> str:
 
 
 def _linkages(account: Account) -> list[str]:
-    rows = [["", "lever m", "links meet at", "nearest pins", "over the pivot"]]
+    rows = [["", "lever m", "links meet at", "nearest pins"]]
     for joint in account.joints:
         own = joint.linkage
         links = "-" if own.transmission_deg is None else f"{own.transmission_deg:.0f} deg at least"
         near = own.nearest
         pins = "-" if near is None else f"{near.first}-{near.second} {near.distance:.3f} m at {near.degrees:.0f} deg"
         lever = f"{own.lever[0]:.3f} to {own.lever[1]:.3f}"
-        rows.append([f"joint {joint.number}", lever, links, pins.replace("the ", ""), ", ".join(own.over_pivot) or "-"])
-    return _table(rows, left=5)
+        rows.append([f"joint {joint.number}", lever, links, pins.replace("the ", "")])
+    return _table(rows, left=4)
 
 
 def _over_stroke(account: Account) -> list[str]:
@@ -253,22 +248,12 @@ def _left_out(account: Account) -> list[str]:
 
 
 def _unknowns(account: Account) -> list[str]:
-    rows = []
-    if account.scene.base.stiffness is not None:
-        rows.append(["base", str(UNKNOWNS_BASE), "turn"])
-    for section, joint in zip(account.sections, account.joints, strict=True):
-        rows.append([f"joint {joint.number}", str(joint.unknowns), SIZE_A if joint.joint.kind == "A" else SIZE_B])
-        if section.parts:
-            parts = f"{len(section.parts)} part{'s' * (len(section.parts) > 1)}"
-            words = f"{parts} x ({section.bending} bending + {section.axial} axial)"
-            rows.append([f"section {section.number}", str(section.unknowns), words])
-    if account.pins:
-        count = len(account.pins)
-        words = f"offset of the journal, {count} pin{'s' * (count > 1)} x 2"
-        rows.append(["clearance", str(UNKNOWNS_PIN * count), words])
-    rows.append(["total", str(account.unknowns), ""])
-    width = max(len(row[1]) for row in rows)
-    return _table([[name, number.rjust(width), words] for name, number, words in rows], left=3)
+    """Return the unknowns by kind: of a joint 2 (A) or 6, of a section those of its beam, of a pin the journal's offset."""
+    rows = [("joints", [joint.unknowns for joint in account.joints])]
+    rows += [("sections", [section.unknowns for section in account.sections])]
+    rows += [("base", [UNKNOWNS_BASE])] if account.scene.base.stiffness is not None else []
+    rows += [("pins with clearance", [UNKNOWNS_PIN] * len(account.pins))] if account.pins else []
+    return _table([[name, str(sum(counts)), " + ".join(map(str, counts))] for name, counts in rows], left=3)
 
 
 def _table(rows: list[list[str]], left: int = 1) -> list[str]:

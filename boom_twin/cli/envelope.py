@@ -8,7 +8,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..system.json_text import json_text
+from ..system.result_text import json_text
 from .arguments import add_file, add_json, add_scene, files_of
 from .output import columns, open_scene, print_result
 
@@ -115,7 +115,7 @@ def _report(result: Envelope, quantities: list[Quantity]) -> list[str]:
 
 
 def _write(folder: Path, result: Envelope, quantities: list[Quantity], values: dict[str, Any], scene: Scene) -> None:
-    from ..plots.envelope import envelope_picture
+    from ..plots.analysis import envelope_picture
 
     (folder / "envelope.csv").write_text(_csv(result, quantities), encoding="utf-8")
     (folder / "envelope.json").write_text(json_text(values) + "\n", encoding="utf-8")

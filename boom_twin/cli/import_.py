@@ -14,8 +14,8 @@ from .arguments import add_file, add_json, files_of
 from .output import columns, print_result, tell, tell_oddities, warn
 
 if TYPE_CHECKING:
+    from ..bag.import_session import ImportedSession
     from ..loggers.assignment import Assignment, ColumnUse
-    from ..loggers.import_session import ImportedSession
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -34,12 +34,10 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Read the files; write the session or print the columns."""
-    from ..bag.session_model import scene_from
-    from ..bag.session_sheet import SessionSheet
-    from ..loggers.assignment import assign
-    from ..loggers.column_file import ColumnFile, columns_of_options, load_columns
-    from ..loggers.files import tables_of
-    from ..loggers.import_session import import_session
+    from ..bag.import_session import import_session
+    from ..bag.session_model import SessionSheet, scene_from
+    from ..loggers.assignment import ColumnFile, assign, columns_of_options, load_columns
+    from ..loggers.log_table import tables_of
     from ..system.result_folder import IMPORT, result_folder
 
     if args.out is None and not args.propose:

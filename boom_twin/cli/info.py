@@ -39,7 +39,7 @@ def run(args: Namespace) -> int:
 
 def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: SessionStrokes) -> dict[str, Any]:
     """Return the facts of a session. Lists of figures have an entry for each of ``topics``."""
-    from ..bag.advice import missing, names_extra, names_missing, remarks
+    from ..bag.advice import missing, remarks
 
     session, metadata, tallies = info.session, info.session.metadata, info.tallies
     topics, joints = mapped.topics, len(scene.scene.joints)
@@ -74,8 +74,6 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: Session
         "log_minus_stamp_min_s": [tally.skew and tally.skew.least for tally in tallies],
         "log_minus_stamp_mean_s": [tally.skew and tally.skew.mean for tally in tallies],
         "log_minus_stamp_max_s": [tally.skew and tally.skew.most for tally in tallies],
-        "names_missing": names_missing(info, topics, joints),
-        "names_extra": names_extra(info, topics, joints),
         "scene": scene.source,
         "mapping": mapped.source,
         "strokes": strokes.reading,
@@ -115,7 +113,6 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
     ]
     lines += [f"state      {values['incomplete']}"] if values["incomplete"] else []
     lines += [f"note       {note}" for note in values["notes"] if not note.startswith("origin: ")]
-    lines += [f"name       {sentence}" for sentence in values["names_extra"]]
     lines += [f"remark     {remark}" for remark in values["remarks"]]
     lines += [f"wiring     {values['wiring']}"]
     lines += [f"missing    {sentence}" for sentence in values["missing_for_replay"]]

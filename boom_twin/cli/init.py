@@ -16,7 +16,7 @@ from .output import tell_oddities
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("--table", metavar="FILE", type=Path, help="dimensions in YAML or CSV")
+    parser.add_argument("--table", metavar="FILE", type=Path, help="dimensions in YAML")
     parser.add_argument("--force", action="store_true", help="replace a scene that is there, after the table was mended")
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--out", metavar="SCENE", type=Path, help="scene file to write; one that is there is left alone")

@@ -22,7 +22,7 @@ from typing import NoReturn, Protocol, TextIO, cast
 
 from .. import __version__
 from ..errors import BoomTwinError
-from ..system.cores import use_one_blas_thread
+from ..system.processes import use_one_blas_thread
 from ..system.terminal_text import PrintableStream, open_closed_streams
 from .output import QuietStream
 
@@ -79,7 +79,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "simulate": (
         "simulate my_boom.yaml --drive examples/strokes.csv --out motion.csv",
         "simulate --drive examples/strokes.csv --force examples/tip_force.csv --out pushed.csv",
-        "simulate --drive examples/strokes.csv --out spread.csv --samples 100 --vary cylinder_2.k=0.1",
     ),
     "replay": (
         "replay bags/arch_session --out out/replay --report",
@@ -89,7 +88,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "calibrate": ("calibrate bags/today bags/tomorrow --out calibrated.yaml",),
     "modal": ("modal bags/night --out out/modal",),
     "batch": ("batch 'bags/*' --out out/batch",),
-    "compare": ("compare bags/before bags/after --out out/compare",),
+    "compare": ("compare bags/before bags/after",),
     "warm": ("warm", "warm --remove"),
     "study": ("study error --out out/study/error",),
     "rig": ("rig --out out/soft --fault cylinder_2.k:softer:0.3", "rig --list-faults"),

@@ -50,7 +50,7 @@ def _check(args: Namespace) -> int:
 
 def as_json(found: Commissioning, text: str) -> dict[str, Any]:
     """Return the result as a flat object; lists have an entry for each channel or stream."""
-    from ..wiring.words import finding, reading
+    from ..wiring.check import finding, reading
 
     verdicts = found.checked.verdicts
     return {
@@ -62,21 +62,19 @@ def as_json(found: Commissioning, text: str) -> dict[str, Any]:
         "lag_streams": [stream.value for stream in found.lags],
         "lags_s": [lag.lag for lag in found.lags.values()],
         "lag_sigmas_s": [lag.sigma for lag in found.lags.values()],
-        "strokes": found.reads and found.reads.value,
         "mapping": text or None,
     }
 
 
 def as_text(found: Commissioning, text: str, out: Path | None) -> list[str]:
     """Return a table of all channels, of lags, and the proposed mapping."""
-    from ..wiring.words import STROKES_ALONE, finding, reading
+    from ..wiring.check import STROKES_ALONE, finding, reading
     from .output import columns
 
     rows = [["channel", "declared as", "found"]]
     rows += [[each.channel, reading(each.declared), finding(each, found.checked)] for each in found.checked.verdicts]
     rows += [[f"{stream.value}.delay", "", lag_words(lag.lag, lag.sigma)] for stream, lag in found.lags.items()]
-    told = "not determined by the encoders" if found.reads is None else f"are {found.reads.value}s"
-    lines = [*columns(rows, left=(0, 1, 2)), "", f"strokes {told}; declared as {found.declared_reads.value}s", ""]
+    lines = [*columns(rows, left=(0, 1, 2)), ""]
     if not text:
         unknown = "; see the channels that are not as declared" if found.wrong else ""
         right = STROKES_ALONE if found.checked.has_strokes_alone else "wiring as expected: nothing to mend"

@@ -28,10 +28,9 @@ def run(args: Namespace) -> int:
 
     import numpy as np
 
-    from ..calibration.rest_periods import Rigging
     from ..calibration.run import common_mapping, common_reading
-    from ..calibration.sessions import read_sessions
-    from ..plots.session import stabilisation_picture
+    from ..calibration.sessions import Rigging, read_sessions
+    from ..plots.results import stabilisation_picture
     from ..report.operational_modes import measured_rests
     from ..system.atomic_files import write_atomic
     from ..system.result_folder import MODAL, result_folder
@@ -75,14 +74,12 @@ def _as_object(rest: MeasuredRest) -> dict[str, Any]:
 
 
 def _flat(rests: list[MeasuredRest]) -> dict[str, Any]:
+    """Return the modes of all rest periods as lists of equal length, without their shapes."""
+    rows = [(number, mode) for number, rest in enumerate(rests, 1) for mode in _as_object(rest)["modes"]]
+    names = ("frequency_Hz", "frequency_sigma_Hz", "damping_ratio", "damping_ratio_sigma", "model_Hz")
     found: dict[str, Any] = {"rest_start_s": [rest.start for rest in rests], "rest_stop_s": [rest.stop for rest in rests]}
-    rows = [(number, each) for number, rest in enumerate(rests, 1) for each in rest.modes]
     found["rest"] = [number for number, _ in rows]
-    found["frequency_Hz"] = [each.frequency for _, each in rows]
-    found["frequency_sigma_Hz"] = [each.frequency_sigma for _, each in rows]
-    found["damping_ratio"] = [each.damping for _, each in rows]
-    found["damping_ratio_sigma"] = [each.damping_sigma for _, each in rows]
-    return found | {"model_Hz": [each.model for _, each in rows]}
+    return found | {name: [mode[name] for _, mode in rows] for name in names}
 
 
 def _as_text(rests: list[MeasuredRest]) -> list[str]:

@@ -17,10 +17,10 @@ from .arguments import add_ros_args, add_session, ros_arguments, window_of
 from .output import open_scene, open_session_scene, open_session_settings, tell, warn_incomplete
 
 if TYPE_CHECKING:
-    from ..monitor.data.feed import Feed, SessionList
+    from ..monitor.data.feed import Feed
 
 
-ACTS = ("mark", "acknowledge", "acknowledge-at-node", "record")
+ACTS = ("mark", "acknowledge")
 NICE = 5  # nice value of the monitor, by which it gives way to the node on the same machine
 
 
@@ -29,7 +29,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--bag",
         metavar="BAG",
         type=Path,
-        help="a recorded session, the bag of a replay, or a folder of several sessions to choose from (the live topics)",
+        help="a recorded session, or the bag of a replay (the live topics)",
     )
     add_session(parser)
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
@@ -39,16 +39,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--webhook", metavar="URL", help="post a JSON object here when an alarm begins, changes its cause, or ends"
     )
-    parser.add_argument(
-        "--allow",
-        nargs="*",
-        choices=ACTS,
-        default=["mark", "acknowledge"],
-        metavar="ACT",
-        help="what viewers may do: mark events, acknowledge alarms (acknowledge-at-node: the node, too, lets go of those that "
-        "ended), start and stop a record(ing) (mark acknowledge)",
-    )
-    parser.add_argument("--record-into", metavar="DIR", type=Path, default=Path("bags"), help="where recordings go (bags)")
+    allow = "what viewers may do: mark events, acknowledge alarms (both)"
+    parser.add_argument("--allow", nargs="*", choices=ACTS, default=ACTS, metavar="ACT", help=allow)
     parser.add_argument("--until-stdin-ends", action="store_true", help=SUPPRESS)  # it ends with the node that started it
     add_ros_args(parser)
 
@@ -57,30 +49,14 @@ def run(args: Namespace) -> int:
     """Serve until Ctrl-C, SIGTERM or the end of the terminal."""
     if find_spec("aiohttp") is None:
         raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
-    from ..monitor.actions import RecorderProcess, ViewerActions
-    from ..monitor.connections import write_log
+    from ..monitor.access_control import write_log
+    from ..monitor.viewer import ViewerActions
 
     _lower_priority()
     write_log()
-    recording = RecorderProcess(args.record_into, _passed_on(args)) if "record" in args.allow and args.bag is None else None
-    try:
-        if args.bag is not None:
-            with closing(_sessions(args)) as sessions:
-                _serve(args, sessions.feed, ViewerActions(sessions.feed, frozenset(args.allow)), sessions)
-        else:
-            with _live_feed(args) as feed:
-                _serve(args, feed, ViewerActions(feed, frozenset(args.allow), recording))
-    finally:
-        if recording is not None:
-            recording.close()
+    with closing(_bag_feed(args)) if args.bag is not None else _live_feed(args) as feed:
+        _serve(args, feed, ViewerActions(feed, args.allow))
     return 0
-
-
-def _passed_on(args: Namespace) -> list[str]:
-    """Return the options that this command passes on to `boom_twin record`."""
-    options = {"--scene": args.scene, "--mapping": args.mapping, "--params": args.params}
-    given = [part for option, value in options.items() if value for part in (option, str(value))]
-    return [*given, *ros_arguments(args)]
 
 
 def _lower_priority() -> None:
@@ -90,19 +66,13 @@ def _lower_priority() -> None:
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
-def _sessions(args: Namespace) -> SessionList:
+def _bag_feed(args: Namespace) -> Feed:
     from ..bag.reader import scan
     from ..monitor.data.bag_feed import bag_feed
-    from ..monitor.data.feed import SessionList, sessions_in
 
-    window = window_of(args)
-
-    def open_feed(path: Path) -> Feed:
-        warn_incomplete(scan(path))
-        scene, settings = open_session_scene(path, args.scene), open_session_settings(path, args.params, args.namespace)
-        return bag_feed(path, scene, settings, args.mapping, window, args.namespace)
-
-    return SessionList(sessions_in(args.bag), open_feed)
+    warn_incomplete(scan(args.bag))
+    scene, settings = open_session_scene(args.bag, args.scene), open_session_settings(args.bag, args.params, args.namespace)
+    return bag_feed(args.bag, scene, settings, args.mapping, window_of(args), args.namespace)
 
 
 @contextmanager
@@ -120,17 +90,17 @@ def _live_feed(args: Namespace) -> Iterator[Feed]:
             yield feed
 
 
-def _serve(args: Namespace, feed: Feed, actions: Any, sessions: SessionList | None = None) -> None:
+def _serve(args: Namespace, feed: Feed, actions: Any) -> None:
     import asyncio
 
     from ..monitor.access_control import AccessControl, token_of
+    from ..monitor.fleet import Webhook
     from ..monitor.server import Server
-    from ..monitor.webhook import Webhook
 
     access = AccessControl(args.host, "" if args.token_file is None else token_of(args.token_file))
     webhook = None if args.webhook is None else Webhook(args.webhook)
     try:
-        asyncio.run(_run(args, Server(feed, actions, access, sessions, webhook), access))
+        asyncio.run(_run(args, Server(feed, actions, access, webhook), access))
     except OSError as error:
         raise BoomTwinError(f"cannot listen on {args.host}:{args.port}: {error.strerror}. Choose another --port.") from None
 

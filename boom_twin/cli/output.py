@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from ..errors import Fault
-from ..system.json_text import json_text
+from ..system.result_text import json_text
 
 if TYPE_CHECKING:
     from ..bag.reader import Session
@@ -91,14 +91,11 @@ def tell_oddities(oddities: Iterable[Fault], source: str | None) -> None:
 
 
 def warn_incomplete(session: Session) -> None:
-    """Warn on stderr if a session is incomplete, its recorder's clock was set back, or messages never reached the recorder."""
-    from ..bag.reader import clocks_set_back
-    from ..bag.session_sheet import missed_messages
+    """Warn on stderr if a session is incomplete, or messages never reached the recorder."""
+    from ..bag.session_model import missed_messages
 
     if session.incomplete:
         warn(f"{session.path}: {session.incomplete}")
-    for told in clocks_set_back(session):
-        warn(told)
     if missed := missed_messages(session.path):
         told = ", ".join(f"{count} of {topic}" for topic, count in missed.items()) + ". A node that got them had other results"
         warn(f"{session.path}: never reached the recorder: {told}")

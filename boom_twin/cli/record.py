@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..bag.session_sheet import SessionSheet
+from ..bag.session_model import SessionSheet
 from ..config.settings import DEFAULT_FILE as DEFAULT_PARAMETERS
 from ..config.settings import load_settings, load_thresholds
 from ..errors import BagError, BoomTwinError
@@ -23,7 +23,7 @@ from .arguments import add_ros_args, positive, ros_arguments
 from .output import tell, tell_oddities, warn
 
 if TYPE_CHECKING:
-    from ..diagnostics.recorder_status import TopicCount
+    from ..diagnostics.topic_status import TopicCount
     from ..ros.bag.subscriptions import RequestedTopic
 
 
@@ -34,9 +34,7 @@ _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
 
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="directory of the bag, new or empty")
-    what = parser.add_mutually_exclusive_group()
-    what.add_argument("--only", choices=["inputs", "outputs"], help="what goes into the twin, or what it publishes (both)")
-    what.add_argument(
+    parser.add_argument(
         "--topics",
         nargs="+",
         metavar="NAME[:TYPE]",
@@ -59,7 +57,7 @@ def run(args: Namespace) -> int:
     """Record until Ctrl-C, SIGTERM or the end of the duration, and print on stderr what was received."""
     require_rclpy()
     from ..bag.async_writer import FileSplit, Storage
-    from ..bag.session_sheet import incompleteness
+    from ..bag.session_model import incompleteness
     from ..bag.writer import BagWriter
     from ..ros.bag.recorder import Recorder, recorder_node
     from ..ros.bag.subscriptions import resolved, resolved_mapping
@@ -163,8 +161,7 @@ def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:
     outputs = {topic.absolute: topic for topic in [*known.outputs.values(), known.events]}
     if args.topics:
         return requested_topics(args.topics, inputs | outputs)
-    chosen = {**({} if args.only == "outputs" else inputs), **({} if args.only == "inputs" else outputs)}
-    return [RequestedTopic(name, topic.type, topic) for name, topic in chosen.items()]
+    return [RequestedTopic(name, topic.type, topic) for name, topic in (inputs | outputs).items()]
 
 
 def long_enough(text: str) -> float:

@@ -11,7 +11,7 @@ from .arguments import add_json
 from .output import print_result, tell
 
 if TYPE_CHECKING:
-    from ..bag.recovery.recover import Recovery
+    from ..bag.recover import Recovery
 
 
 SHOWN = 20  # faults that are printed one by one
@@ -20,20 +20,14 @@ SHOWN = 20  # faults that are printed one by one
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap; only read")
     parser.add_argument("--out", required=True, metavar="DIR", help="directory of the new session, new or empty")
-    parser.add_argument(
-        "--unverified",
-        action="store_true",
-        help="save also the whole messages at the start of chunks that were cut off or whose checksum does not fit; "
-        "their values may be wrong",
-    )
     add_json(parser)
 
 
 def run(args: Namespace) -> int:
     """Save a sound session, and print what was saved and what was lost."""
-    from ..bag.recovery.recover import recover
+    from ..bag.recover import recover
 
-    outcome = recover(Path(args.bag), Path(args.out), args.unverified)
+    outcome = recover(Path(args.bag), Path(args.out))
     for path, fault in outcome.faults[:SHOWN]:
         tell(f"{path}: bytes {fault.offset} to {fault.offset + fault.length}: {fault.reason}")
     if outcome.fault_count > SHOWN:

@@ -39,16 +39,14 @@ def add_arguments(parser: ArgumentParser) -> None:
     purpose = "propose the leanest model whose tip stays so near to this scene's (mm, cm, m)"
     parser.add_argument("--need", type=tip_error, metavar="tip=1mm", help=purpose)
     add_file(parser, "--out", "with --need: write the lean scene file here", "LEAN")
-    purpose = "with --need: measure against this scene of the same boom, not against SCENE itself"
-    parser.add_argument("--against", metavar="FULL", help=purpose)
 
 
 def refuse_misuse(args: Namespace) -> None:
     """Raise UsageError for an option that needs ``--need``, without it, and for writing over a file."""
     if args.need is None:
-        refuse_given(args, "goes with --need only. Add --need tip=1mm.", "out", "against")
+        refuse_given(args, "goes with --need only. Add --need tip=1mm.", "out")
     elif args.out is not None:
-        check_new(args.out, files_of(args, "scene", "against"))
+        check_new(args.out, files_of(args, "scene"))
 
 
 def tip_error(text: str) -> float:
@@ -66,7 +64,7 @@ def tip_error(text: str) -> float:
     return value
 
 
-def search(scene: Scene, most: float, against: Scene | None) -> Proposal:
+def search(scene: Scene, most: float) -> Proposal:
     """Search for the leanest model, with progress on stderr."""
     from ..reduction.search import propose
 
@@ -74,7 +72,7 @@ def search(scene: Scene, most: float, against: Scene | None) -> Proposal:
         if sys.stderr.isatty():
             print(f"\r{what:70s}\r", end="", file=sys.stderr, flush=True)
 
-    proposal = propose(against or scene, most, scene, show)
+    proposal = propose(scene, most, scene, show)
     show("")
     return proposal
 

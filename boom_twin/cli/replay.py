@@ -36,10 +36,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     drawn = parser.add_mutually_exclusive_group()
     drawn.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
     drawn.add_argument("--report", action="store_true", help="write report.html too, to read or to print")
-    heights = (
-        "heights of the sections in m, for the stresses in the report; by default the scene's, else those of thin-walled boxes"
-    )
-    parser.add_argument("--section-height", metavar="H1,H2,..", help=heights)
     purpose = "in the report, fatigue of all stations: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
     parser.add_argument("--fatigue", nargs="?", type=float, const=71.0, metavar="CATEGORY", help=purpose)
     purpose = "write samples.csv or samples.parquet (by pyarrow): predicted, measured, estimated, a row for every stroke stamp"
@@ -52,13 +48,11 @@ def run(args: Namespace) -> int:
     from ..offline.inputs import ReplayOptions
     from ..offline.sample_table import SampleTable, check_kind, columns_of, table_file
     from ..report.evaluation import evaluated_replay
-    from ..report.quantities import section_heights
     from ..system.result_folder import REPLAY, result_folder
 
     if not args.report:
         refuse_given(args, "goes into the report. Give --report too.", "fatigue")
     scene = open_session_scene(args.bag, args.scene)
-    heights = section_heights(args.section_height, scene.scene)
     settings = open_session_settings(args.bag, args.params, args.namespace)
     check_kind(args.table)
     window = window_of(args)
@@ -86,9 +80,7 @@ def run(args: Namespace) -> int:
             with_bag=not args.no_bag,
             causes=args.causes,
         )
-        found = evaluated_replay(
-            building, args.bag, scene, settings, options, heights, args.fatigue, add if args.table else None
-        )
+        found = evaluated_replay(building, args.bag, scene, settings, options, args.fatigue, add if args.table else None)
         files = [path.name for path in _write(args, found, building)]
         for file, table in tables:
             table.finish()
@@ -112,8 +104,9 @@ def flat(summary: dict[str, Any]) -> dict[str, Any]:
 def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
     from ..offline.history import draw
     from ..report.page import write_report
+    from ..report.quantities import FILE_NAME as QUANTITIES
 
-    files = [found.file]
+    files = [out / QUANTITIES]
     if not args.no_pictures:
         files += draw(found.result, found.history, found.scene, out)
     if args.report:
@@ -124,7 +117,7 @@ def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
 def as_text(summary: dict[str, Any]) -> list[str]:
     """Return the lines of a short table."""
     from ..health.sensor_monitor import noise_as_text
-    from ..offline.summary import alarm_as_text
+    from ..offline.recording import alarm_as_text
 
     lines = [
         f"samples            {summary['samples']} in {summary['duration_s']:.1f} s",
@@ -157,7 +150,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
 def count_as_text(name: str, count: int, reads: StrokeReading) -> str:
     """Return in words how often an irregularity was met."""
     from ..messages.sample_decoder import ODDITIES
-    from ..twin.events import event_meaning
+    from ..twin.blocks import event_meaning
 
     meaning = (event_meaning(name, reads) or ODDITIES.get(name, "")).partition(";")[0]
     return f"{count} time{'' if count == 1 else 's'}" + (f": {meaning}" if meaning else "")

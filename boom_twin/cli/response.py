@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..analysis.frequency_response import FrequencyResponse
 
 Flags = NDArray[np.bool_]
-LOW, HIGH, POINTS, RATES, STEPS = 0.05, 30.0, 300, (0.2, 1.2, 201), 1
+LOW, HIGH, POINTS, RATES = 0.05, 30.0, 300, (0.2, 1.2, 201)
 FASTEST_PUMP = 2.0  # Hz, of pumps
 SWING_SHARE = 0.05  # of the reach: swings beyond are not in proportion to the load
 SWING_WORN = 1e-4  # m, the same on pins with clearance
@@ -55,10 +55,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     load.add_argument("--load", metavar="CSV", help="steady state under this force at the tip: t_s,fx_N,fy_N, one period")
     parser.add_argument("--from", dest="low", type=float, default=LOW, metavar="F", help="lowest frequency, Hz (default 0.05)")
     parser.add_argument("--to", dest="high", type=float, default=HIGH, metavar="F", help="highest frequency, Hz (default 30)")
-    parser.add_argument("--points", type=int, default=POINTS, metavar="N", help="frequencies, evenly in their logarithm (300)")
     parser.add_argument("--rates", type=_rates, default=RATES, metavar="F:F:N", help="of a map (default 0.2:1.2:201)")
-    steps = "of a map, from each posture to the next (default 1)"
-    parser.add_argument("--steps", type=int, default=STEPS, metavar="N", help=steps)
     parser.add_argument("--out", metavar="DIR", help="folder for table and picture: new, empty, or of an earlier response")
     add_json(parser)
 
@@ -111,13 +108,12 @@ def run(args: Namespace) -> int:
 
 
 def _check_options(args: Namespace) -> None:
-    grid = {"--from": args.low != LOW, "--to": args.high != HIGH, "--points": args.points != POINTS}
-    mapped = {"--rates": args.rates != RATES, "--steps": args.steps != STEPS}
+    grid = {"--from": args.low != LOW, "--to": args.high != HIGH}
     is_map = args.map is not None
     for option in [name for name, is_given in grid.items() if is_given and (is_map or args.pump or args.load)]:
         raise UsageError(f"{option}: goes with a frequency response, not with --pump, --load or --map. Leave it out.")
-    for option in [name for name, is_given in mapped.items() if is_given and not is_map]:
-        raise UsageError(f"{option}: goes with --map. Leave it out.")
+    if args.rates != RATES and not is_map:
+        raise UsageError("--rates: goes with --map. Leave it out.")
 
 
 def _place(args: Namespace) -> str:
@@ -128,20 +124,17 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     """Return the frequency response at logarithmically even points, and at the natural frequencies among them."""
     from ..analysis.equilibrium import statics
     from ..analysis.frequency_response import UPWARD, frequency_response, with_all_shapes
-    from ..plots.frequency_response import response_picture
+    from ..plots.analysis import response_picture
 
-    if not (0.0 < args.low < args.high < float("inf") and 2 <= args.points <= 1_000_000):
-        raise UsageError(
-            f"--from {args.low:g} --to {args.high:g} --points {args.points}: frequencies must be above 0 Hz and ascend, with "
-            "2 to 1000000 points. Give such."
-        )
+    if not 0.0 < args.low < args.high < float("inf"):
+        raise UsageError(f"--from {args.low:g} --to {args.high:g}: frequencies must be above 0 Hz and ascend. Give such.")
     rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=MODES_SOUGHT)
     natural = rest.frequencies[(rest.frequencies > args.low) & (rest.frequencies < args.high)]
     force = None if args.drive is not None else tuple(args.tip or UPWARD)
     place = args.strokes, args.posture, force, args.drive
     at, beside = (frequency_response(scene, frequencies, *place).tip for frequencies in (natural, BESIDE * natural))
     bounded = np.linalg.norm(at, axis=1) < SHARP * np.linalg.norm(beside, axis=1)
-    frequencies = np.unique(np.concatenate([np.geomspace(args.low, args.high, args.points), natural[bounded]]))
+    frequencies = np.unique(np.concatenate([np.geomspace(args.low, args.high, POINTS), natural[bounded]]))
     result = frequency_response(scene, frequencies, *place)
     static = frequency_response(scene, np.zeros(1), *place)
     if force is None:
@@ -195,7 +188,7 @@ def _resonances(result: FrequencyResponse, static: FrequencyResponse, natural: A
 
 def _steady(scene: Scene, args: Namespace) -> Answer:
     from ..analysis.steady_state import load_of_rows, pump_load, steady_state
-    from ..plots.frequency_response import steady_state_picture
+    from ..plots.analysis import steady_state_picture
 
     if args.pump:
         if args.pump[0] > FASTEST_PUMP:
@@ -240,18 +233,16 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
 
 
 def _map(scene: Scene, args: Namespace) -> Answer:
-    from ..analysis.resonance_map import postures_along, resonance_map
-    from ..analysis.steady_state import pump_load
-    from ..plots.frequency_response import resonance_picture
+    from ..analysis.steady_state import pump_load, resonance_map
+    from ..plots.analysis import resonance_picture
+    from ..scene.kinematics import posture_angles
 
     if not args.pump:
         raise UsageError("--map needs --pump RATE:HEIGHT, the pulses whose rate it varies. Add --pump 0.4:130.")
-    if not 1 <= args.steps <= 1000:
-        raise UsageError(f"--steps {args.steps}: must be 1 to 1000 from each posture to the next.")
     names = list(scene.postures) if args.map == "all" else re.findall(r"\[[^]]*]|[^,]+", args.map)
     if not names:
         raise UsageError("--map all: the scene names no posture. Add `postures` to it.")
-    postures = postures_along(scene, names, args.steps)
+    postures = {name: posture_angles(scene, name) for name in names}
     result = resonance_map(scene, postures, np.linspace(*args.rates), lambda rate: pump_load(scene, rate, *args.pump[1:]))
     title = f"Resonance map: pump pulses of {args.pump[1]:g} N"
     bands = result.to_avoid()

@@ -26,7 +26,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--tip-acceleration", type=positive, default=0.5, metavar="A", help=acceleration)
     parser.add_argument("--duration", type=positive, metavar="S", help="s (default 60)")
     parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise (0)")
-    parser.add_argument("--clean", action="store_true", help="sensors without noise and rounding")
     share = "every k, d, EI and mass of the simulated boom off by this share, at random: 0.02 is 2 %% (0)"
     parser.add_argument("--wrong", type=float, default=0.0, metavar="SHARE", help=share)
     parser.add_argument("--rig-seed", type=int, default=0, metavar="N", help="of --wrong: one boom for each (0)")
@@ -111,9 +110,8 @@ def _cylinders(text: str | None, scene: Scene) -> list[tuple[float, float]]:
 
 def run(args: Namespace) -> int:
     """Simulate, sample, write."""
-    from ..bag.session_files import write_session
-    from ..bag.session_model import scene_from
-    from ..bag.session_sheet import RIG_ORIGIN, SessionSheet
+    from ..bag.session_model import RIG_ORIGIN, SessionSheet, scene_from
+    from ..bag.session_writer import samples_of, write_samples
     from ..offline.ground_truth import FILE_NAME
     from ..system.result_folder import RIG, result_folder
     from ..validation.rig import (
@@ -121,22 +119,18 @@ def run(args: Namespace) -> int:
         Sensors,
         bundled,
         faults,
-        faulty_boom,
         loads,
-        noise_free,
         random_programme,
         through_postures,
     )
     from ..validation.rig import record as record_session
-    from ..validation.rig.sensors import RATE
 
     assumed, out = scene_from(args.scene), Path(args.out)
     tell_oddities(assumed.oddities, assumed.source)
     scene = assumed.scene
     duration = BUNDLED_DURATION if args.duration is None else args.duration
     recorded = set(sensors_of(args.sensors))
-    rate = RATE if args.rate is None else args.rate
-    sensors = noise_free(rate) if args.clean else Sensors(rate)
+    sensors = Sensors() if args.rate is None else Sensors(args.rate)
     asked = (("imu", args.imu), ("moment", args.moment), ("point", args.point))
     places = {name: place for kind, texts in asked for name, place in named_places(kind, texts, scene).items()}
     cylinders = _cylinders(args.pressures, scene)
@@ -145,7 +139,7 @@ def run(args: Namespace) -> int:
     wrong = [faults.parse(text) for text in args.fault]
     faults.check(wrong, scene, duration)
     _refuse_unrecorded([fault.cause for fault in wrong], recorded)
-    boom, changes = faulty_boom.changes(faulty_boom.wrong_by(scene, args.wrong, args.rig_seed), wrong)
+    boom, changes = faults.changes(faults.wrong_by(scene, args.wrong, args.rig_seed), wrong)
     pushing = [loads.parse(text) for text in args.load]
     loads.check(pushing, duration)
     load = loads.tip_load(scene, pushing, duration, args.seed) if pushing else None
@@ -154,7 +148,7 @@ def run(args: Namespace) -> int:
     else:
         programme = random_programme(scene, args.random, duration, args.seed) if args.random else bundled(scene)
     drive = faults.drifting(programme, wrong)
-    notes = {"origin": RIG_ORIGIN, "noise": "none" if args.clean else "standard", "seed": str(args.seed)}
+    notes = {"origin": RIG_ORIGIN, "noise": "standard", "seed": str(args.seed)}
     if args.wrong:
         notes["wrong"] = f"k, d, EI and masses off by {args.wrong:g}, rig seed {args.rig_seed}"
     if wrong:
@@ -163,7 +157,7 @@ def run(args: Namespace) -> int:
         notes["loads"] = f"at the tip, wind seed {args.seed}: " + ", ".join(map(str, pushing))
     if args.rate is not None:
         notes["rate"] = f"{args.rate:g} Hz"
-    if "forces" in recorded and not args.clean:
+    if "forces" in recorded:
         notes["forces"] = f"noise {sensors.force_sigma:g} N, resolution {sensors.force_resolution:g} N"
     with result_folder(out, RIG, files_of(args, "scene")) as building:
         tell(f"simulating {duration:g} s, about as long as that ..")
@@ -174,8 +168,9 @@ def run(args: Namespace) -> int:
         readings = {"angles": session.joints, "imu": session.imu, "forces": session.forces}
         joints, imu, forces = (values if name in recorded else None for name, values in readings.items())
         placed = {stream: rows for stream, rows in session.placed.items() if stream is not Stream.RATE or "gyro" in recorded}
-        given = session.stamps, session.strokes, joints, imu, notes, session.angle_stamps, forces, placed
-        write_session(building, *given)
+        values = {Stream.STROKES: session.strokes, Stream.ANGLES: joints, Stream.IMU: imu, Stream.FORCES: forces, **placed}
+        there = {stream: rows for stream, rows in values.items() if rows is not None}
+        write_samples(building, samples_of(session.stamps, there, session.angle_stamps), there, notes)
         # not the boom that was simulated: what a twin is to assume
         own = _mapping_text(places, cylinders)
         sheet = SessionSheet(__version__, assumed.text, mapping=own, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)

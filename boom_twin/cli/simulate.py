@@ -11,19 +11,15 @@ import numpy as np
 
 from ..errors import UsageError
 from ..scene import Scene
-from ..system.atomic_files import check_new, check_target, write_atomic
+from ..system.atomic_files import check_target, write_atomic
 from ..system.csv_table import CsvTable, columns_text, read_csv
-from ..system.summary_display import numbers
+from ..system.result_text import numbers
 from ..types import Array
-from .arguments import add_json, add_scene, files_of, not_negative, refuse_given
+from .arguments import add_json, add_scene, files_of, not_negative
 from .output import open_scene, print_result, warn
 
 if TYPE_CHECKING:
-    from ..analysis.balances import EnergyBalance, MomentumBalance
-    from ..analysis.initial_state import InitialState
     from ..analysis.simulate import Simulation
-
-    Balances = tuple[EnergyBalance, MomentumBalance]
 
 POSTURE_DEVIATION = 1e-3  # m, largest deviation of the first row from the posture's strokes
 FASTEST_CYLINDER = 0.5  # m/s, speed above which a warning comes; booms stay below 0.3
@@ -46,20 +42,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_json(parser)
     quick = "step once and say nothing of errors: four to seven times as fast"
     parser.add_argument("--no-error-estimate", action="store_true", help=quick)
-    check = "print the balances of energy and of momentum along the motion, stepped twice more"
-    parser.add_argument("--check", action="store_true", help=check)
-    where = "where the boom is at the first row: rest (the default), undeflected, or a file of --save-state"
-    parser.add_argument("--start", default="rest", metavar="STATE", help=where)
-    parser.add_argument("--joint-rates", metavar="R1,R2,..", help="rates of the joint angles, rad/s, with --start undeflected")
-    parser.add_argument("--save-state", metavar="FILE.json", help="the boom at the last row, for --start of another run")
-    parser.add_argument("--orbits", metavar="FILE.png", help="picture of the journals in their bushes, at the drive's rows")
     damping = "numerical damping of the fastest vibrations, as what is left of them after a step: 0 to 1 (default 0.8)"
     parser.add_argument("--rho", type=_share, metavar="RHO", help=damping)
-    many = "Monte Carlo: so many booms with parameters drawn at random; OUT.csv has mean, deviation, quantiles"
-    parser.add_argument("--samples", type=int, metavar="N", help=many)
-    what = "a parameter and its standard deviation: a share, of loads kg or kg/m; may be repeated (with --samples)"
-    parser.add_argument("--vary", action="append", metavar="NAME=SIGMA", help=what)
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the samples (0)")
 
 
 def _share(text: str) -> float:
@@ -70,125 +54,30 @@ def _share(text: str) -> float:
 
 def run(args: Namespace) -> int:
     """Read, simulate, write."""
-    from ..analysis.balances import energy_balance, momentum_balance
-    from ..analysis.initial_state import write_state
-    from ..analysis.simulate import RHO, course_of, simulate
-    from ..compiler.compile import compile_scene
-    from ..scene.edit import with_rigid_cylinders
+    from ..analysis.simulate import RHO, simulate
 
     scene = open_scene(args.scene)
-    _check_sampling(args)
-    if args.orbits and not compile_scene(scene).pins:
-        raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
     sources = files_of(args, "drive", "lengths", "force", "scene")
     check_target(Path(args.out), sources, _is_earlier)
-    for picture_or_state in filter(None, (args.orbits, args.save_state)):
-        check_new(Path(picture_or_state), sources)
-    _check_targets({"--out": args.out, "--orbits": args.orbits, "--save-state": args.save_state})
     times, strokes, stem = read_history(sources[0], len(scene.joints), ("length", "stroke") if args.lengths else ("stroke",))
     pushed = None if args.force is None else _columns(read_csv(Path(args.force), UsageError), FORCE_COLUMNS)
     for oddity in odd_in_drive(times, strokes, stem):
         warn(f"{sources[0]}: {oddity}")
     angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0], bool(args.lengths))
-    if args.samples is not None:
-        return _sample(args, scene, times, strokes, angles, pushed)
-    moving = with_rigid_cylinders(scene) if args.lengths else scene
-    start = _start(args, moving, strokes[0], angles)
     rho = RHO if args.rho is None else args.rho
-    followed = {"lengths" if args.lengths else "strokes": strokes, "force": pushed}
-    result = simulate(
-        scene, times, dt=args.dt, angles=angles, rho=rho, estimate_errors=not args.no_error_estimate, start=start, **followed
-    )
+    drives, lengths = (None, strokes) if args.lengths else (strokes, None)
+    result = simulate(scene, times, drives, args.dt, angles, rho, not args.no_error_estimate, lengths=lengths, force=pushed)
     for doubt in result.doubts:
         warn(f"{doubt}.")
     write_atomic(Path(args.out), columns_text(result.columns()))
-    if args.save_state:
-        write_state(Path(args.save_state), result.end)
-    balances = None
-    if args.check:
-        course = course_of(moving, times, strokes, args.dt, angles, rho, start, force=pushed)
-        balances = energy_balance(course, args.dt), momentum_balance(course, args.dt)
-    print_result(args.json, as_json(result, args.out, balances), as_text(result, args.out, args.start, balances))
-    if args.orbits:
-        _draw_orbits(args, scene, result)
+    print_result(args.json, as_json(result, args.out), as_text(result, args.out))
     return 0
 
 
-def _check_targets(targets: dict[str, str | None]) -> None:
-    seen: dict[Path, str] = {}
-    for option, target in targets.items():
-        if target and seen.setdefault(Path(target).resolve(), option) != option:
-            raise UsageError(f"{option} {target}: {seen[Path(target).resolve()]} writes this file too. Give it another file.")
-
-
-def _check_sampling(args: Namespace) -> None:
-    if args.samples is None:
-        refuse_given(args, "goes with --samples N. Add it, or leave --vary out.", "vary")
-        return
-    single = ["check", "save_state", "orbits", "rho", *(["start"] if args.start != "rest" else [])]
-    refuse_given(args, "is of one motion, --samples of many. Leave one of them out.", *single)
-    refuse_given(args, "--samples draws booms that follow drives. Give --drive instead.", "lengths")
-
-
-def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles: Array | None, force: Array | None) -> int:
-    from ..analysis.monte_carlo import simulate_samples
-    from ..offline.progress import progress_of
-
-    out = Path(args.out)
-    table = out.with_name(f"{out.stem}_samples.csv")
-    check_new(table, files_of(args, "drive", "force", "scene"))
-    progress = progress_of(args.samples, "samples", "simulate")
-    deviations = dict(map(_deviation, args.vary or ()))
-    found = simulate_samples(
-        scene, times, strokes, deviations, args.samples, args.seed, args.dt, angles, progress.update, force
-    )
-    progress.close()
-    for failure in found.failures:
-        warn(f"left out: {failure}")
-    if found.doubtful:
-        warn(f"{found.doubtful} samples move in a way that simulate doubts.")
-    write_atomic(out, columns_text(found.columns()))
-    write_atomic(table, columns_text(found.samples))
-    spread = {name: np.quantile(values, (0.025, 0.5, 0.975)) for name, values in found.samples.items()}
-    right = args.samples - len(found.failures)
-    figures = {"out": args.out, "samples_out": str(table), "samples": right, "left_out": len(found.failures), "seed": args.seed}
-    lines = [f"{name:28s} {numbers(values)}" for name, values in spread.items()]
-    head = f"{right} samples; 2.5 %, 50 %, 97.5 % of them, SI:"
-    print_result(args.json, figures | spread, [head, *lines, args.out, str(table)])
-    return 0
-
-
-def _deviation(text: str) -> tuple[str, float]:
-    name, _, value = text.partition("=")
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        raise UsageError(f"--vary {text}: give NAME=SIGMA, as cylinder_2.k=0.1.") from None
-
-
-def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) -> InitialState | None:
-    """Return the state of ``--start``; None for rest."""
-    from ..analysis.initial_state import read_state, undeflected
-
-    if args.joint_rates is not None and args.start != "undeflected":
-        raise UsageError(f"--joint-rates {args.joint_rates}: go with --start undeflected. Leave them out, or start there.")
-    if args.start == "rest":
-        return None
-    if args.start != "undeflected":
-        if not Path(args.start).exists():
-            raise UsageError(f"--start {args.start}: no such file. Give rest, undeflected, or a file of --save-state.")
-        return read_state(Path(args.start))
-    try:
-        rates = None if args.joint_rates is None else np.array([float(rate) for rate in args.joint_rates.split(",")])
-    except ValueError:
-        raise UsageError(f"--joint-rates {args.joint_rates}: give {len(scene.joints)} numbers with commas, rad/s.") from None
-    return undeflected(scene, first, rates, angles)
-
-
-def as_json(result: Simulation, out: str, balances: Balances | None) -> dict[str, object]:
-    """Return the figures of a simulation, and the balances if given."""
+def as_json(result: Simulation, out: str) -> dict[str, object]:
+    """Return the figures of a simulation."""
     x, y = result.tip[:, 0], result.tip[:, 1]
-    figures: dict[str, object] = {
+    return {
         "out": out,
         "rows": len(result.times),
         "duration_s": float(result.times[-1] - result.times[0]),
@@ -201,42 +90,21 @@ def as_json(result: Simulation, out: str, balances: Balances | None) -> dict[str
         "lost_contacts": [f"{name}: {lost}" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)],
         "warnings": result.doubts,
     }
-    if balances is not None:
-        energy, momentum = balances
-        names = ("work", "change", "damping", "contact", "gap", "left")
-        figures |= {f"energy_{name}_J": getattr(energy, name) for name in names} | {"energy_gap_share": energy.share}
-        figures |= {"momentum_gap_N_s": momentum.linear_gap, "momentum_gap_share": momentum.linear_share}
-        figures |= {
-            "moment_of_momentum_gap_N_m_s": momentum.angular_gap,
-            "moment_of_momentum_gap_share": momentum.angular_share,
-        }
-    return figures
 
 
-def as_text(result: Simulation, out: str, start: str, balances: Balances | None) -> list[str]:
+def as_text(result: Simulation, out: str) -> list[str]:
     """Return the lines of text with the figures of a simulation."""
-    figures = as_json(result, out, balances)
+    figures = as_json(result, out)
     (x, y), (end_x, end_y) = result.tip[0, :2], result.tip[-1, :2]
-    began = {"rest": "started at rest ", "undeflected": "undeflected     "}.get(start, "went on         ")
     lines = [
-        f"{began}  strokes {numbers(result.strokes[0])} m, tip x {x:.4f} m, y {y:.4f} m",
+        f"started at rest   strokes {numbers(result.strokes[0])} m, tip x {x:.4f} m, y {y:.4f} m",
         f"followed          {figures['rows']} rows, {figures['duration_s']:g} s; the tip went {figures['tip_travel_m']:.3f} m "
         f"to x {end_x:.4f} m, y {end_y:.4f} m",
         f"tip acceleration  {figures['tip_acceleration_max_m_s2']:.3g} m/s^2 at most",
         f"cylinder forces   {numbers(figures['cylinder_force_max_N'], 1e-3)} kN at most",
     ]
     lines += [f"{name}: contact lost {lost} times" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)]
-    return [*lines, *(f"{balance}." for balance in balances or ()), out]
-
-
-def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:
-    from ..compiler.compile import compile_scene
-    from ..plots.history import Orbits
-    from ..plots.posture import orbits_picture
-
-    gaps = compile_scene(scene).tables.clearances.gap
-    orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
-    orbits_picture(Path(args.orbits), f"{Path(args.drive or args.lengths).name}: journals in their bushes", orbits)
+    return [*lines, out]
 
 
 def _is_earlier(start: bytes) -> bool:

@@ -12,8 +12,8 @@ from .output import open_scene
 
 # kind: (module in boom_twin.validation.study with write(scene, out, quick, posture) -> paths, what it does)
 KINDS: dict[str, tuple[str, str]] = {
-    "error": ("error.report", "error against run time of all methods, beside Exudyn"),
-    "stability": ("stability.report", "where each method holds, degrades or fails on stiff and extreme cases"),
+    "error": ("error", "error against run time of all methods, beside Exudyn"),
+    "stability": ("stability", "where each method holds, degrades or fails on stiff and extreme cases"),
     "parts": ("parts", "what every part of a model costs, and what leaving it out changes"),
 }
 
@@ -27,8 +27,6 @@ def add_arguments(parser: ArgumentParser) -> None:
         own.add_argument("--out", required=True, metavar="DIR", help=place)
         own.add_argument("--posture", metavar="NAME", help="where the motion starts (default: arch, or the first)")
         own.add_argument("--quick", action="store_true", help="few cases on a short motion")
-        if name == "stability":
-            own.add_argument("--soak", action="store_true", help="also the holds of 24 simulated hours, some minutes more")
 
 
 def run(args: Namespace) -> int:
@@ -36,10 +34,9 @@ def run(args: Namespace) -> int:
     from ..system.result_folder import result_folder, study
 
     write: Callable[..., list[Path]] = import_module(f"boom_twin.validation.study.{KINDS[args.kind][0]}").write
-    options = {"soak": True} if getattr(args, "soak", False) else {}
     scene, out = open_scene(args.scene), Path(args.out)
     with result_folder(out, study(args.kind), files_of(args, "scene")) as building:
-        written = write(scene, building, quick=args.quick, posture=args.posture, **options)
+        written = write(scene, building, quick=args.quick, posture=args.posture)
     for path in written:
         print(out / path.name)
     return 0

@@ -20,7 +20,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Write the files and print their paths."""
-    from ..messages.view_files import VIEWS, view_text
+    from ..messages.urdf import VIEWS, view_text
 
     args.out.mkdir(parents=True, exist_ok=True)
     if there := [args.out / view.name for view in VIEWS if (args.out / view.name).exists()]:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
+from ruamel.yaml.scalarstring import LiteralScalarString
+from ruamel.yaml.util import load_yaml_guess_indent
 
 from ..errors import BoomTwinError, Fault, FaultKind
 from ..system.received_files import open_received
@@ -22,6 +26,7 @@ LARGEST_FILE = 4 * 2**20
 MOST_VALUES = 50_000
 """Limit for the number of values in a file, with aliases expanded."""
 DEEPEST = 20
+LINE_WIDTH = 120  # characters of a line in an edited text
 
 TAG = "tag:yaml.org,2002:"
 TYPED = {"int": "whole number", "float": "number", "bool": "true or false", "null": "empty value"}
@@ -76,12 +81,11 @@ def words(place: Place) -> str:
 
 @dataclass
 class Document:
-    """Values of a text, line (from 1) and cell of a spreadsheet of the places in it, and what was wrong with the writing."""
+    """Values of a text, line (from 1) of the places in it, and what was wrong with the writing."""
 
     values: Any = None
     lines: dict[Place, int] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
-    cells: dict[Place, str] = field(default_factory=dict)
 
     def line(self, place: Place) -> int | None:
         """Return the line of a place; of the nearest block around it if the place itself is not in the text."""
@@ -101,12 +105,7 @@ class Document:
 
     def fault(self, place: Place, value: Any, bound: str, remedy: str, kind: FaultKind = "fault") -> Fault:
         """Return a fault or a warning at a place of this text."""
-        return Fault(words(place) + self._cells_at(place), value, bound, remedy, self.line(place), kind)
-
-    def _cells_at(self, place: Place) -> str:
-        """Return `` (cell C3)`` for a place, or the cells of both its numbers; nothing for a block."""
-        cells = [cell for own, cell in self.cells.items() if own[: len(place)] == place and len(own) - len(place) <= 1]
-        return f" (cell{'s' * (len(cells) > 1)} {', '.join(cells)})" if 0 < len(cells) <= 2 else ""
+        return Fault(words(place), value, bound, remedy, self.line(place), kind)
 
 
 class YamlReader:
@@ -214,34 +213,49 @@ class BoundedComposer(Composer):
         return super().compose_node(parent, index)
 
 
-Pair = tuple[Node, Node]
-
-
-def with_value(text: str, place: Place, value: Any) -> str:
-    """Return the text with another value at `place`. Missing blocks on the way to it are added.
+def with_values(text: str, changes: Iterable[tuple[Place, Any]]) -> str:
+    """Return the text with other values. Comments stay, except those behind a removed key; lines in braces are wrapped anew.
 
     Parameters
     ----------
-    value : bool, int, float, str or dict of these
-        New value; None removes the key.
+    changes : iterable of (place, value)
+        New plain values; None removes a key. Missing blocks on the way to a place are added.
     """
-    root = YAML(typ="safe", pure=True).compose(text)
-    block, depth = _deepest(root, place)
-    key, rest = place[depth], place[depth + 1 :]
-    pairs: list[Pair] = block.value
-    names = [str(name.value) for name, _ in pairs]
-    if value is None:
-        return _removed(text, block, names.index(str(key))) if key in names and not rest else text
-    for step in reversed(rest):
-        value = {step: value}
-    if key not in names:
-        return _inserted(text, block, f"{key}: {yaml_text(value)}")
-    name, node = pairs[names.index(str(key))]
-    start, end = int(node.start_mark.index), _end(text, node)
-    if start < int(node.end_mark.index):
-        return text[:start] + yaml_text(value) + text[end:]
-    colon = text.index(":", int(name.end_mark.index)) + 1  # nothing stands there: its mark lies further on
-    return f"{text[:colon]} {yaml_text(value)}{text[colon:]}"
+    yaml, stream = YAML(), StringIO()
+    yaml.preserve_quotes, yaml.width = True, LINE_WIDTH
+    root, indent, offset = load_yaml_guess_indent(text, yaml=yaml)
+    if root is None:
+        root = CommentedMap()
+        stream.write(text)  # comments alone
+    for place, value in changes:
+        _change(root, place, value)
+    yaml.indent(mapping=2, sequence=indent or 2, offset=offset or 0)
+    yaml.dump(root, stream)
+    return stream.getvalue()
+
+
+def _change(block: Any, place: Place, value: Any) -> None:
+    key, rest = place[0], place[1:]
+    is_there = isinstance(key, int) or key in block
+    if rest and is_there and block[key] is not None:
+        _change(block[key], rest, value)
+    elif value is None:
+        block.pop(key, None)
+    else:
+        for step in reversed(rest):
+            value = {step: value}
+        block[key] = _rounded(value)
+
+
+def _rounded(value: Any) -> Any:
+    """Return a value with six digits in its numbers, and a text of several lines as a block."""
+    if isinstance(value, dict):
+        return CommentedMap((key, _rounded(item)) for key, item in value.items())
+    if isinstance(value, list | tuple):
+        return CommentedSeq(map(_rounded, value))
+    if isinstance(value, str):
+        return LiteralScalarString(value) if "\n" in value else value
+    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def whole_text(values: Any) -> str:
@@ -255,60 +269,11 @@ def whole_text(values: Any) -> str:
 
 
 def yaml_text(value: Any) -> str:
-    """Return a value as YAML with six digits. A text of several lines becomes a block for the outermost mapping."""
+    """Return a value as YAML in one line, with six digits."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key}: {yaml_text(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(yaml_text, value)) + "]"
-    if isinstance(value, str) and "\n" in value:
-        return "|2-\n" + "\n".join(f"  {line}".rstrip() for line in value.split("\n"))
     if isinstance(value, bool | str):
         return json.dumps(value, ensure_ascii=False)
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def _deepest(node: Node, place: Place) -> tuple[MappingNode, int]:
-    """Return the last existing mapping on the way to a place, and the number of steps to it."""
-    found, depth, inner = cast(MappingNode, node), 0, cast(Node | None, node)
-    for taken, step in enumerate(place[:-1], start=1):
-        if isinstance(inner, MappingNode):
-            inner = next((value for key, value in inner.value if key.value == step), None)
-        elif isinstance(inner, SequenceNode) and isinstance(step, int):
-            inner = inner.value[step]
-        if isinstance(inner, MappingNode):
-            found, depth = inner, taken
-    return found, depth
-
-
-def _inserted(text: str, block: MappingNode, line: str) -> str:
-    """Return the text with a key added at the end of a block in braces, else above its first key."""
-    if block.flow_style and not block.value:
-        return f"{text[: block.start_mark.index]}{{{line}}}{text[block.end_mark.index :]}"
-    if block.flow_style:
-        end = _end(text, block.value[-1][1])
-        return f"{text[:end]}, {line}{text[end:]}"
-    mark = block.value[0][0].start_mark
-    return f"{text[: mark.index]}{line}\n{' ' * mark.column}{text[mark.index :]}"
-
-
-def _removed(text: str, block: MappingNode, number: int) -> str:
-    """Return the text without a key and its value. In a block without braces, the rest of the line is removed, too."""
-    pairs: list[Pair] = block.value
-    start, end = pairs[number][0].start_mark.index, _end(text, pairs[number][1])
-    if number == 0:
-        return text[:start] + text[pairs[1][0].start_mark.index :]
-    if block.flow_style:
-        return text[: _end(text, pairs[number - 1][1])] + text[end:]
-    line_end = text.find("\n", end)
-    return text[: text.rfind("\n", 0, start) + 1] + (text[line_end + 1 :] if line_end >= 0 else "")
-
-
-def _end(text: str, node: Node) -> int:
-    """Return the end of the text of a node. The end mark of a block without braces lies after the comments that follow it."""
-    if not isinstance(node, CollectionNode):
-        start = int(node.start_mark.index)
-        return start + len(text[start : node.end_mark.index].rstrip())
-    if node.flow_style or not node.value:
-        return int(node.end_mark.index)
-    last = node.value[-1]
-    return _end(text, last[1] if isinstance(node, MappingNode) else last)

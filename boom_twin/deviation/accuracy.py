@@ -67,7 +67,7 @@ def accuracy_at(
         Strokes out of reach; no equilibrium there.
     """
     boom = BoomPredictor(scene, settings or Settings(), mounts, reads, places)
-    driving = boom.readings_at(statics(scene, drives).lengths)
+    driving = boom.finder.readings_at(statics(scene, drives).lengths)
     boom.start(driving)
     widths = [len(names) for stream, names in boom.channels.items() if stream is not Stream.STROKES]
     counts = np.array([sum(each is stream for each in sensors) for stream in Stream])

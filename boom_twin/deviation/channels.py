@@ -17,6 +17,7 @@ from ..kernels.elements.beam_shapes import integrals_to, rotations_at
 from ..kernels.jit import inner
 from ..kernels.tables import BEAM, FRAME_ANGLE, JOINT_A, JOINT_B, OFFSET
 from ..types import SENSORS, Array, Place, Stream, channels_of, streams_of
+from .delayed import begin_instant, copy_reading
 from .rows import (
     SHAKEN_TIME,
     SWAY_SHARE,
@@ -143,19 +144,21 @@ def specific_force_row(p, f, c, row):
 
 
 @inner
-def write_expected_readings(p, f, live, results, h, values, sigmas):
+def write_expected_readings(p, f, live, results, stamp, h, values, sigmas):
     """Write the expected readings of all sensors for the newest prediction, and the residuals' standard deviations.
 
     Parameters
     ----------
     results : Results
         Of the prediction.
+    stamp : int
+        ns.
     h : float
         Time since the prediction before, s.
     values, sigmas : ndarray, shape (measured channels,)
         In the order of the channels: rad, m/s^2, N, rad/s, N m, m.
     """
-    size = zero_place(p)
+    size, copies = zero_place(p), begin_instant(p, f, stamp)
     for c in range(p.channels.shape[0]):
         channel, noise2, sway = p.channels[c], p.channels[c].noise2, measurement_row(p, f, c, f.row)
         if channel.kind == READS_ANGLE:
@@ -178,6 +181,9 @@ def write_expected_readings(p, f, live, results, h, values, sigmas):
         else:
             values[c] = f.felt[c]
         sigmas[c] = math.sqrt(noise2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
+        if copies >= 0 and f.copies[c] >= 0:
+            f.row[size + channel.zero] = 1.0
+            copy_reading(p, f, copies + f.copies[c], 0.0 if channel.kind == READS_NOTHING else values[c])
 
 
 def measurement_of(

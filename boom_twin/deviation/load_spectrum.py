@@ -19,7 +19,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.even_times import BREAK
+from ..analysis.sample_series import BREAK
 from ..types import NANO, Array
 
 BIN = 0.05  # s

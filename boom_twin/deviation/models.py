@@ -213,6 +213,7 @@ def leave_contradiction(p, f, size):
 @inner
 def follow_prediction(p, f):
     """Set the estimate to the prediction; the sensors' zeros are unknown then."""
+    p.delayed[0] = 0
     size, every, n = zero_place(p), all_states(p), p.drives.shape[0]
     for k in range(2):
         for i in range(every):

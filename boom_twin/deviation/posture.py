@@ -7,8 +7,7 @@ With the drives d, a force f at the tip and modal coordinates q (unit modal mass
 
 Z_i and Z_a static responses to a unit of a drive and of the force, S_j mode shapes, phi_j their motion of the tip, N_ji their
 forces in the cylinders, R_a = Z_a - sum_j phi_ja / omega_j^2 S_j the static response that the modes leave out. What sensors
-read changes by the same columns. When the posture moves, modes follow by one step of subspace iteration from those before
-(K.-J. Bathe, Finite Element Procedures, ch. 11) on sweeps at a negative square of the frequency.
+read changes by the same columns. When the posture moves, modes follow it (`mode_tracking`).
 """
 
 from __future__ import annotations
@@ -29,20 +28,17 @@ from ..kernels.jit import by_reference, inner, kernel
 from ..kernels.tables import FRAME_ANGLE, FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, OK, Motion
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
-from ..kernels.transfer.natural_frequency import condense
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from ..kernels.transfer.time_step import ANEW, advance
 from ..types import Array, StrokeReading
 from .channels import TIP_IMU_STATES, Measurement
+from .mode_tracking import iterate_modes, modal_loss, nudge_of, restore
 from .sensor_model import Mounting
 
 FORCE_SIZE = 1.0  # N
 DRIVE_SIZE = 1e-6  # m, loads that differences are taken over
-NUDGE = 1e-6  # rad, largest change of an unknown that derivatives of positions are taken over
-LOAD = 1e-9  # m, displacement whose inertia loads the boom in a step of subspace iteration
 WIDEST = math.pi  # rad, range in which a joint angle is looked for
 CURVATURE_STEP = 1e-4  # rad
-SWEEPS = 30  # of Jacobi rotations, at most
 
 
 @by_reference
@@ -64,7 +60,8 @@ class Posture(NamedTuple):
     frames, absolute, sways : (n,) of angle sensors, see `Mounting`. roots : (n + 1,)
     frames of the pivots and of the tip. masses : (h,) kg, kg m^2. lengths : (n,) of the sections, m. closed : (n,) m.
     channels, sites, errors, psi, weights, bending : see `boom_twin.deviation.channels.Measurement`.
-    behind : (1,) states that the estimate has beside those of the prediction.
+    behind : (1,) states of sensors' errors that the estimate has beside those of the prediction. delayed : (1,) copies of late
+    readings behind these, see `boom_twin.deviation.delayed`.
     The other fields are scratch; `rate` (n,) stays zero.
     """
 
@@ -104,6 +101,7 @@ class Posture(NamedTuple):
     weights: Array
     bending: Array
     behind: NDArray[np.int64]
+    delayed: NDArray[np.int64]
     still: Array
     position: Array
     hat: Array
@@ -136,7 +134,8 @@ def new_posture(
         tilt=np.where(mounting.absolute, inclination, 0.0), gravity=np.array(plan.tables.gravity), slope=np.zeros(n),
         curvature=np.zeros(n), frames=mounting.frames.astype(np.int64), absolute=mounting.absolute, sways=mounting.sways,
         roots=roots.astype(np.int64), masses=plan.masses,
-        lengths=lengths, closed=plan.closed_lengths, **measured._asdict(), behind=np.array([TIP_IMU_STATES + 2 * n]),
+        lengths=lengths, closed=plan.closed_lengths, **measured._asdict(),
+        behind=np.array([TIP_IMU_STATES + 2 * n]), delayed=np.zeros(1, np.int64),
         still=np.zeros(histories), position=np.zeros(histories), hat=np.zeros(histories),
         response=np.zeros((most, unknowns)), sides=np.zeros((2, width)),
         shifted=np.zeros((most, histories)), small=np.zeros((4, most, most)), target=np.zeros(n), rate=np.zeros(n),
@@ -201,14 +200,6 @@ def linearise(t, boom, work, p, drives, follow):
 
 
 @inner
-def restore(t, boom, work, p):
-    """Put the boom back to rest."""
-    for i in range(boom.z.shape[0]):
-        boom.z[i] = p.rest[i]
-    place(t, boom, work)
-
-
-@inner
 def note_linkages(t, p):
     """Write the joint angles of the rigid boom at the strokes of the drives, and their derivatives by stroke."""
     for i in range(p.angles.shape[0]):
@@ -235,27 +226,18 @@ def respond_statically(t, boom, work, p):
             for i in range(n):
                 work.drive[i], work.drive_rate[i] = p.closed[i] + p.drives[i], 0.0
             if motion.renew and not loaded:
-                sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE, work.condensed)
+                sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
                 motion = Motion(0.0, 0.0, p.position, p.still, False)
                 clear_cut(work, FREE)
             if k < 2:
                 work.p[k] = -sign * FORCE_SIZE
             else:
                 work.drive[k - 2] += sign * DRIVE_SIZE
-            sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE, work.condensed)
-            sweep_out(t, boom, work, work.condensed, ROOT, operations, FREE)
+            sweep_in(t, boom, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
+            sweep_out(t, boom, work, ROOT, operations, FREE)
             size = 2.0 * (FORCE_SIZE if k < 2 else DRIVE_SIZE)
             for i in range(boom.z.shape[0]):
                 p.columns[k, i] = work.dz[i] / size if sign > 0.0 else p.columns[k, i] - work.dz[i] / size
-
-
-@inner
-def nudge_of(t, increments):
-    """Return how many of these increments of the unknowns turn none of them by more than `NUDGE`."""
-    largest = 1e-300
-    for i in range(increments.shape[0]):
-        largest = max(largest, t.scale[i] * abs(increments[i]))
-    return NUDGE / largest
 
 
 @inner
@@ -319,184 +301,3 @@ def leave_modes_out(p):
                 p.forces[a, i] -= share * p.forces[at, i]
             for i in range(p.bending.shape[0]):
                 p.moments[a, i] -= share * p.moments[at, i]
-
-
-# -- modes ------------------------------------------------------------------------------------------------------------------
-
-
-@inner
-def iterate_modes(t, boom, work, p):
-    """Update the modes to the present posture: (K + s^2 M) y_j = s^2 M phi_j, then Rayleigh-Ritz in the span of the y_j."""
-    n, m = p.drives.shape[0], p.modes[0]
-    if m == 0:
-        return
-    shift2 = p.omega[0] * p.omega[0]
-    for j in range(m):
-        respond_to_inertia(t, boom, work, p, j, shift2)
-    for j in range(m):
-        move_along(t, boom, work, p, j)
-    mass, stiffness, turned, inverse = p.small[0], p.small[1], p.small[2], p.small[3]
-    for j in range(m):
-        scale = 1.0 / math.sqrt(weigh(p, p.shifted[j], p.shifted[j]))
-        turned[0, j] = scale
-        for i in range(p.shifted.shape[1]):
-            p.shifted[j, i] *= scale
-        for i in range(p.response.shape[1]):
-            p.response[j, i] *= scale
-    for j in range(m):
-        for k in range(m):
-            stiffness[j, k] = shift2 * weigh(p, p.shifted[j], p.motions[k]) * turned[0, k]
-    for j in range(m):
-        for k in range(m):
-            mass[j, k] = weigh(p, p.shifted[j], p.shifted[k])
-    for j in range(m):
-        for k in range(j + 1):
-            both = 0.5 * (stiffness[j, k] + stiffness[k, j])
-            stiffness[j, k] = stiffness[k, j] = both
-    for j in range(m):
-        for k in range(m):
-            stiffness[j, k] -= shift2 * mass[j, k]
-    solve_small(mass, stiffness, inverse, m)
-    for j in range(m):
-        p.omega[j] = math.sqrt(max(stiffness[j, j], 1e-12))
-        combine(p.shifted, inverse, j, m, p.motions[j])
-        combine(p.response, inverse, j, m, p.columns[2 + n + j])
-    for j in range(m):
-        scale = 1.0 / math.sqrt(weigh(p, p.motions[j], p.motions[j]))
-        for i in range(p.motions.shape[1]):
-            p.motions[j, i] *= scale
-        for i in range(p.columns.shape[1]):
-            p.columns[2 + n + j, i] *= scale
-
-
-@inner
-def respond_to_inertia(t, boom, work, p, j, shift2):
-    """Write the unknowns' answer to the inertia of mode `j` in motion at the square -`shift2` of its frequency."""
-    for i in range(p.drives.shape[0]):
-        work.drive[i], work.drive_rate[i] = p.closed[i] + p.drives[i], 0.0
-    for sign in (1.0, -1.0):
-        for i in range(p.hat.shape[0]):
-            p.hat[i] = p.position[i] + sign * LOAD * p.motions[j, i]
-        condense(t, boom, work, Motion(shift2, 0.0, p.hat, p.still, True), work.drive, work.drive_rate)
-        sweep_out(t, boom, work, work.condensed, ROOT, t.operations.shape[0], FREE)
-        for i in range(boom.z.shape[0]):
-            found = work.dz[i] / (2.0 * LOAD)
-            p.response[j, i] = found if sign > 0.0 else p.response[j, i] - found
-
-
-@inner
-def move_along(t, boom, work, p, j):
-    """Write how all mass points move with the unknowns of response `j`."""
-    size = nudge_of(t, p.response[j])
-    for sign in (1.0, -1.0):
-        for i in range(boom.z.shape[0]):
-            boom.z[i] = p.rest[i] + sign * size * p.response[j, i]
-        place(t, boom, work)
-        for i in range(p.shifted.shape[1]):
-            found = work.position[i] / (2.0 * size)
-            p.shifted[j, i] = found if sign > 0.0 else p.shifted[j, i] - found
-    restore(t, boom, work, p)
-
-
-@inner
-def weigh(p, one, other):
-    """Return the modal mass of two motions (h,), kg."""
-    total = 0.0
-    for i in range(one.shape[0]):
-        total += p.masses[i] * one[i] * other[i]
-    return total
-
-
-@inner
-def combine(vectors, weights, j, m, found):
-    """Write the sum of vectors (m, k) by column `j` of the weights."""
-    for i in range(found.shape[0]):
-        total = 0.0
-        for k in range(m):
-            total += weights[k, j] * vectors[k, i]
-        found[i] = total
-
-
-@inner
-def solve_small(mass, stiffness, vectors, m):
-    """Solve the eigenproblem of two symmetric matrices (m, m) that are nearly diagonal; order and signs stay.
-
-    The mass becomes the unit matrix by Gram and Schmidt, then the stiffness a diagonal by Jacobi rotations of at most 45
-    degrees. `stiffness` then has the eigenvalues, column j of `vectors` their vectors in the basis that was given.
-    """
-    for j in range(m):
-        for k in range(m):
-            vectors[j, k] = 1.0 if j == k else 0.0
-    for j in range(m):
-        for k in range(j):
-            add_column(mass, stiffness, vectors, m, j, k, -mass[k, j] / mass[k, k])
-        scale = 1.0 / math.sqrt(max(mass[j, j], 1e-300))
-        for i in range(m):
-            vectors[i, j] *= scale
-        for i in range(m):
-            mass[i, j] *= scale
-            stiffness[i, j] *= scale
-        for i in range(m):
-            mass[j, i] *= scale
-            stiffness[j, i] *= scale
-    for _ in range(SWEEPS):
-        largest = 0.0
-        for j in range(m):
-            for k in range(j):
-                largest = max(largest, abs(stiffness[j, k]) / math.sqrt(abs(stiffness[j, j] * stiffness[k, k]) + 1e-300))
-                rotate(stiffness, vectors, m, j, k)
-        if largest < 1e-14:
-            return
-
-
-@inner
-def add_column(mass, stiffness, vectors, m, j, k, share):
-    """Add a share of basis vector k to basis vector j."""
-    for i in range(m):
-        vectors[i, j] += share * vectors[i, k]
-    for i in range(m):
-        mass[i, j] += share * mass[i, k]
-        stiffness[i, j] += share * stiffness[i, k]
-    for i in range(m):
-        mass[j, i] += share * mass[k, i]
-        stiffness[j, i] += share * stiffness[k, i]
-
-
-@inner
-def rotate(a, vectors, m, j, k):
-    """Make the entry (j, k) of a symmetric matrix zero by the smaller rotation."""
-    if a[j, k] == 0.0:
-        return
-    apart = (a[k, k] - a[j, j]) / (2.0 * a[j, k])
-    tangent = (1.0 if apart >= 0.0 else -1.0) / (abs(apart) + math.sqrt(apart * apart + 1.0))
-    c = 1.0 / math.sqrt(tangent * tangent + 1.0)
-    s = tangent * c
-    for i in range(m):
-        one, other = a[i, j], a[i, k]
-        a[i, j], a[i, k] = c * one - s * other, s * one + c * other
-    for i in range(m):
-        one, other = a[j, i], a[k, i]
-        a[j, i], a[k, i] = c * one - s * other, s * one + c * other
-    for i in range(m):
-        one, other = vectors[i, j], vectors[i, k]
-        vectors[i, j], vectors[i, k] = c * one - s * other, s * one + c * other
-
-
-@inner
-def modal_loss(t, p, increments):
-    """Return 2 zeta omega (1/s) of a mode by the power that oil dampers, beams and base take from it."""
-    loss = 0.0
-    for i in range(p.drives.shape[0]):
-        force = increments[t.cylinders[i].z]
-        loss += p.lag[i] * p.compliance[i] * force * force
-    for k in range(t.hinges.shape[0]):
-        turn = increments[t.hinges[k].z]
-        loss += t.hinges[k].damping * turn * turn
-    for row in range(t.beams.shape[0]):
-        beam = t.beams[row]
-        for i in range(beam.bending):
-            for k in range(beam.bending):
-                loss += beam.beta * increments[beam.z + i] * t.stiffness[row, i, k] * increments[beam.z + k]
-        if beam.axial > 0:
-            loss += beam.beta * beam.axial_stiffness * increments[beam.z + beam.bending] ** 2
-    return loss

@@ -10,35 +10,32 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.bending_moments import moments_by_unknowns
-from ..analysis.cylinder_drives import spring_free
+from ..analysis.bending_stress import moments_by_unknowns
 from ..analysis.equilibrium import outline, settle
 from ..analysis.modal import natural_modes
 from ..analysis.undeflected import UndeflectedBoom
 from ..compiler.compile import compile_scene
-from ..compiler.plan import first_row, taken_apart
 from ..config.settings import Settings
 from ..errors import SolverError, UsageError
 from ..kernels.jit import hold
-from ..kernels.result_row import PIN, places_in, prediction_width
-from ..kernels.tables import FRAME_ANGLE, OK, SENTENCES, State, Tables, Work
-from ..predictions import Outline, Prediction
-from ..scene.edit import with_rigid_cylinders
-from ..scene.kinematics import joint_angles_of_strokes, strokes_of_angles
+from ..kernels.result_row import places_in, prediction_width
+from ..kernels.tables import OK, SENTENCES, State, Tables, Work
+from ..predictions import Outline
+from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
-from ..types import GIVE, NO_PLACES, SENSORS, Array, Clock, Mount, Place, Stream, StrokeReading, channels_of, streams_of
+from ..types import NO_PLACES, SENSORS, Array, Clock, Mount, Place, Stream, StrokeReading, channels_of, streams_of
 from .channels import DRIFT_FIRST, LAG_FIRST, READS_MOMENT, TIP_IMU_STATES, measurement_of
 from .estimate_row import MODES
 from .kalman import FORCE_ZERO
 from .models import start_models
 from .posture import Posture, linearise, new_posture
-from .sensor_model import TURN, mounting_of
+from .rest_at_readings import RestFinder
+from .sensor_model import mounting_of
 from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 GAUGE_DRIFT = 0.03  # share of the moment in a root second, by which the zero of a strain gauge drifts
-PASSES, SAME = 20, 1e-10  # passes for the boom at rest by its angle sensors, until they read the same, rad
 WIDTH = 1e-6  # relative accuracy of natural frequencies
 USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 2.5e-3, 1e-4, 2e-3, 2e-2  # shares of the boom's weight, see `SensorNoise`
 DOUBTED_DRIFT = 1000.0  # times the usual variance of the drift of a zero, of a sensor in doubt
@@ -101,6 +98,7 @@ class BoomPredictor:
         The boom as predicted by the newest sample.
     posture : Posture
     filters : Filters
+    finder : RestFinder
     channels : dict of Stream to tuple of str
         Channels of every stream; none of those that the boom does not have.
     compiled : CompiledBoom
@@ -134,7 +132,7 @@ class BoomPredictor:
         sizes = (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)
         noise = SensorNoise(settings.variance(SENSORS[reads.stream]), *(size * weight for size in sizes))
         self.filters = new_filters(n, MODES, measured, noise)
-        self._struts = compile_scene(with_rigid_cylinders(scene))
+        self.finder = RestFinder(scene, self.plan, self.posture, reads)
         tables, boom = self.plan.tables, (self._anchor, self.live, self._work)
         self.compiled = CompiledBoom(tables, *boom, self.posture, self.filters, self._bending, self._row)
 
@@ -153,11 +151,6 @@ class BoomPredictor:
         """Numbers in a row of a prediction."""
         return len(self._row)
 
-    @property
-    def variances(self) -> Array:
-        """Variances of what drives the model, as predicted, m^2 or rad^2, shape (n,)."""
-        return self._row[self.places.variances]
-
     def start(self, readings: Array, may_move: bool = False) -> Array:
         """Reset to rest in equilibrium where what drives the model reads `readings` (m or rad), shape (n,); return these.
 
@@ -173,19 +166,10 @@ class BoomPredictor:
         UsageError, SolverError
             Lengths or angles out of reach; no equilibrium there.
         """
-        p, f, boom, held = self.posture, self.filters, self._anchor, self._struts.state()
-        drives = readings
-        if self._reads is StrokeReading.ANGLE:
-            drives, rigid = self._held_by_angles(held, readings)
-        else:
-            rigid = joint_angles_of_strokes(self._scene, readings)
-        if self._reads is StrokeReading.LENGTH:
-            settle(self._struts, held, self._struts.work(), readings, rigid)
-        if self._reads is not StrokeReading.DRIVE:
-            forces = taken_apart(self._struts, first_row(self._struts, held)).cylinder_forces
-            drives = spring_free(self.plan, drives, forces)
-        settle(self.plan, boom, self._work, drives, rigid)
-        p.angles[:] = rigid
+        p, f, boom = self.posture, self.filters, self._anchor
+        drives, angles, readings = self.finder.rest_at(readings)
+        settle(self.plan, boom, self._work, drives, angles)
+        p.angles[:] = angles
         modes = natural_modes(self.plan, boom, self._work, MODES, WIDTH, 2.0 * math.pi * HIGHEST)
         p.modes[0] = len(modes)
         for j, mode in enumerate(modes):
@@ -196,51 +180,9 @@ class BoomPredictor:
         if status != OK:
             raise SolverError(SENTENCES[int(status)])
         self._free_gauges()
-        sag = float(np.hypot(*(boom.frames[-1, :2] - self._undeflected.at(rigid)[-1])))
+        sag = float(np.hypot(*(boom.frames[-1, :2] - self._undeflected.at(angles)[-1])))
         start_models(p, f, SPEED if may_move else 0.0, SWING * sag if may_move else 0.0)
-        if self._reads is not StrokeReading.ANGLE:
-            return readings
-        return readings - TURN * np.rint((readings - self._angles_in(held)) / TURN) * p.absolute
-
-    def _held_by_angles(self, held: State, readings: Array) -> tuple[Array, Array]:
-        """Settle `held` on rigid cylinders where angle sensors read `readings` (rad); return lengths and angles of joints.
-
-        The angle of a joint with an encoder is its reading. Inclinometers read the bending inboard, too, which is subtracted.
-        """
-        p, work = self.posture, self._struts.work()
-        joints, off = np.zeros(len(readings)), readings - p.tilt
-        for _ in range(PASSES):
-            turned = 0.0
-            for i, joint in enumerate(self._scene.joints):
-                low, high = np.radians(joint.range_deg)
-                step = off[i] - (turned if p.absolute[i] else 0.0)
-                step -= TURN * np.rint((joints[i] + step - 0.5 * (low + high)) / TURN) if p.absolute[i] else 0.0
-                joints[i], turned = joints[i] + step, turned + step
-                if not low - GIVE <= joints[i] <= high + GIVE:
-                    raise UsageError(
-                        f"joint_{i + 1} = {math.degrees(joints[i]):.4g} deg: its range_deg is {joint.range_deg[0]:g} to "
-                        f"{joint.range_deg[1]:g}. Check its sensor's unit, sign and zero in the mapping."
-                    )
-            lengths = strokes_of_angles(self._scene, joints)
-            settle(self._struts, held, work, lengths, joints)
-            off = readings - self._angles_in(held)
-            off -= TURN * np.rint(off / TURN) * p.absolute
-            if np.abs(off).max() < SAME:
-                break
-        return lengths, joints
-
-    def readings_at(self, lengths: Array) -> Array:
-        """Return what drives the model reads at rest with cylinder `lengths` (m), shape (n,)."""
-        if self._reads is not StrokeReading.ANGLE:
-            return lengths
-        held = self._struts.state()
-        settle(self._struts, held, self._struts.work(), lengths, joint_angles_of_strokes(self._scene, lengths))
-        return self._angles_in(held)
-
-    def _angles_in(self, state: State) -> Array:
-        """Return what angle sensors read of a boom at rest, rad, shape (n,)."""
-        p, angles = self.posture, state.frames[:, FRAME_ANGLE]
-        return np.where(p.absolute, angles[p.frames], angles[p.roots[:-1]] - angles[p.roots[:-1] - 1]) + p.tilt
+        return readings
 
     def _free_gauges(self) -> None:
         """Write how far the zeros of strain gauges may be off, as of forces: by the moment that they bear."""
@@ -336,16 +278,17 @@ class BoomPredictor:
     def rebase(self, shift: int) -> None:
         """Shift stamps by `shift` (ns) from now on."""
         self.filters.status[FED_STAMP] += shift
+        self.filters.instants[:] += shift
 
-    def add_phase(self, prediction: Prediction) -> None:
-        """Add the phase uncertainty of the vibration in `prediction` after a pause of unknown length.
+    def add_phase(self) -> None:
+        """Add the phase uncertainty of the vibration at the newest sample after a pause of unknown length.
 
         Two phases differ by up to twice the amplitude.
         """
         m, n, p = int(self.posture.modes[0]), self.plan.joints, self.posture
         if m == 0:
             return
-        velocity, acceleration = prediction.tip_velocity, prediction.tip_acceleration
+        _, velocity, acceleration = self._row[self.places.tip].reshape(3, 3)[:, :2]
         amplitude2 = 2.0 * (velocity @ velocity / p.omega[0] ** 2 + acceleration @ acceleration / p.omega[0] ** 4)
         motion2 = float(p.readings[2 + n, n : n + 2] @ p.readings[2 + n, n : n + 2])
         for covariance in self.filters.p:
@@ -358,12 +301,12 @@ class BoomPredictor:
         return float(self.filters.evidence[0])
 
     @property
-    def tip_load(self) -> tuple[Array, Array]:
-        """Estimated force at the tip that the model does not know (N), and its variances, shape (2,) each."""
+    def tip_loads(self) -> tuple[Array, Array]:
+        """Force at the tip that the model does not know, predicted and estimated (N), and variances, shape (2, 2) each."""
         fast = 2 * int(self.posture.modes[0]) + np.arange(2)
-        mean, spread = self.filters.mean[ESTIMATE], self.filters.spread[ESTIMATE]
-        variances = spread[fast, fast] + 2.0 * spread[fast, fast + 2] + spread[fast + 2, fast + 2]
-        return mean[fast] + mean[fast + 2], variances
+        mean, spread = self.filters.mean, self.filters.spread
+        variances = spread[:, fast, fast] + 2.0 * spread[:, fast, fast + 2] + spread[:, fast + 2, fast + 2]
+        return mean[:, fast] + mean[:, fast + 2], variances
 
     @property
     def tip_sigmas(self) -> Array:
@@ -395,32 +338,3 @@ class BoomPredictor:
         frames, positions, angles, _ = map(np.array, zip(*drawn, strict=True))
         lines = outline(self.plan, frames, positions), self._undeflected.at(angles)
         return [Outline(shape, undeflected, each.pins) for shape, undeflected, each in zip(*lines, drawn, strict=True)]
-
-    def prediction(self, stamp: int, drawn: Outline | None = None, moments: Array | None = None) -> Prediction:
-        """Return what the newest sample gave, with an outline and bending moments (N m) if they are given."""
-        return self.prediction_in(self._row.copy(), stamp, drawn, moments)
-
-    def prediction_in(self, row: Array, stamp: int, drawn: Outline | None = None, moments: Array | None = None) -> Prediction:
-        """Return the prediction in a row, with views of it; see `boom_twin.kernels.result_row`."""
-        at = self.places
-        tip = row[at.tip].reshape(3, 3)
-        angle, angular_velocity, angular_acceleration = tip[:, 2].tolist()
-        position = tip[0, :2]
-        return Prediction(
-            stamp=stamp,
-            tip_position=position,
-            tip_displacement=position - row[at.rigid_tip],
-            tip_velocity=tip[1, :2],
-            tip_acceleration=tip[2, :2],
-            tip_angle=angle,
-            tip_angular_velocity=angular_velocity,
-            tip_angular_acceleration=angular_acceleration,
-            joints=row[at.joints],
-            strokes=row[at.strokes],
-            cylinder_forces=row[at.cylinder_forces],
-            shape=None if drawn is None else drawn.shape,
-            undeflected=None if drawn is None else drawn.undeflected,
-            pins=None if drawn is None else drawn.pins,
-            clearances=row[at.pins].reshape(-1, PIN),
-            moments=moments,
-        )

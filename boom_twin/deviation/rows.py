@@ -28,6 +28,15 @@ def read(row, x, size):
 
 
 @inner
+def difference(row, x, other, size):
+    """Return the reading of a row at state `x` less that at another one."""
+    total = 0.0
+    for k in range(size):
+        total += row[k] * (x[k] - other[k])
+    return total
+
+
+@inner
 def about_rest(p, row, x, size):
     """Return the reading of a row less that at rest."""
     total, drive = read(row, x, size), drive_place(p)

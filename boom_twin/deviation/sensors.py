@@ -6,11 +6,12 @@ import math
 
 from ..kernels.jit import inner, kernel
 from .channels import READS_ACCELERATION, READS_ANGLE, READS_COORDINATE, READS_RATE, TIP_IMU_STATES, measurement_row
+from .delayed import delayed_row, note_lateness
 from .kalman import ANGLE_ZERO, correct
 from .learning import SURPRISE
 from .mixture import mix, weigh_models
 from .rows import SWAY_SHARE, clear, read, variance_of
-from .states import ALL_OPEN, ALL_VALVES, ESTIMATE, FED, FED_STAMP, PREDICTION, all_states, drive_place, zero_place
+from .states import ALL_OPEN, ALL_VALVES, ESTIMATE, FED, FED_STAMP, PREDICTION, all_states, zero_place
 
 INEXACT = 0.03  # error of the model's accelerations and rates of turn: share of their root mean square at the site
 LEARN_NOISE = 0.02  # weight of one reading in the learnt noise of its channel
@@ -36,7 +37,7 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
     stamp, newest : int
         Stamps of the sample, and of the newest lengths, ns.
     """
-    age = (newest - stamp) * 1e-9
+    age = (newest - stamp) * 1e-9  # s
     last, usable, lag = first, False, p.channels[first].lag
     while last < p.channels.shape[0] and p.channels[last].stream == stream:
         usable |= math.isfinite(residuals[last - first]) and not f.masked[last]
@@ -45,6 +46,8 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         return
     patience = SLOW if p.channels[first].kind == READS_COORDINATE else 0
     f.status[FED], f.status[FED_STAMP] = 1, max(f.status[FED_STAMP], newest + patience)
+    if age > 0.0:
+        note_lateness(p, f, stream, first, last, age)
     f.likely[ALL_VALVES] = f.likely[ALL_OPEN] = 0.0
     for c in range(first, last):
         residual = residuals[c - first]
@@ -52,7 +55,13 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
             continue
         channel = p.channels[c]
         admit_errors(p, f, max(channel.last, lag + 1) + 1)
-        measurement_row(p, f, c, f.row)
+        if age == 0.0:
+            measurement_row(p, f, c, f.row)
+            f.row[zero_place(p) + channel.zero] = 1.0
+            if lag >= 0:
+                rate_of_row(p, f, f.row, f.rows[2])
+        elif not delayed_row(p, f, c, stamp, f.row, f.rows[2]):
+            continue
         variance = channel.noise2
         if channel.kind == READS_ACCELERATION:
             variance += INEXACT * INEXACT * f.shaking[channel.site, 0]
@@ -61,8 +70,8 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         elif channel.kind == READS_ANGLE:
             variance += SWAY_SHARE * SWAY_SHARE * f.sway2[channel.index]
         if lag >= 0:
-            variance += add_lag(p, f, lag, f.row)
-        take_reading(p, f, c, residual, variance, age)
+            variance += add_lag(p, f, lag, f.row, f.rows[2])
+        take_reading(p, f, c, residual, variance)
         if channel.kind == READS_ANGLE and f.deaf[channel.index]:
             replace_length(p, f, c, residual)
     weigh_models(f, ESTIMATE)
@@ -75,8 +84,14 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
 def admit_errors(p, f, count):
     """Append states of sensor errors to the estimate until there are `count`, each with its first variance."""
     zero = zero_place(p)
+    if p.behind[0] < count:
+        p.delayed[0] = 0  # copies stand behind
     while p.behind[0] < count:
         at, p.behind[0] = zero + p.behind[0], p.behind[0] + 1
+        for k in range(PREDICTION, ESTIMATE + 1):
+            f.mean[k, at] = 0.0
+            for i in range(at + 1):
+                f.spread[k, i, at] = f.spread[k, at, i] = 0.0
         for k in range(ALL_VALVES, ALL_OPEN + 1):
             f.x[k, at] = 0.0
             for i in range(at + 1):
@@ -85,21 +100,25 @@ def admit_errors(p, f, count):
 
 
 @inner
-def add_lag(p, f, lag, row):
+def rate_of_row(p, f, row, rates):
+    """Write the row of the rate of the reading of `row` at the newest instant."""
+    size, h = zero_place(p), f.interval[1]
+    clear(rates, all_states(p))
+    for i in range(size):
+        if row[i] != 0.0 and h > 0.0:
+            rates[i] -= row[i] / h
+            for c in range(f.counts[i]):
+                rates[f.places[i, c]] += row[i] / h * f.weights[i, c]
+
+
+@inner
+def add_lag(p, f, lag, row, rates):
     """Add the column of a stream's lag to a row, minus the rate of the reading; return the variance by an uncertain rate.
 
     A rate that may be zero tells nothing of the lag. The lag is then noise.
     """
-    size, at, rates, h = zero_place(p), zero_place(p) + lag, f.rows[2], f.interval[1]
-    if h == 0.0:
-        return 0.0
-    clear(rates, all_states(p))
-    for i in range(size):
-        if row[i] != 0.0:
-            rates[i] -= row[i] / h
-            for c in range(f.counts[i]):
-                rates[f.places[i, c]] += row[i] / h * f.weights[i, c]
-    rate, variance = read(rates, f.mean[ESTIMATE], size), variance_of(rates, f.spread[ESTIMATE], f.gain, size)
+    every, at = all_states(p), zero_place(p) + lag
+    rate, variance = read(rates, f.mean[ESTIMATE], every), variance_of(rates, f.spread[ESTIMATE], f.gain, every)
     if rate * rate > CLEAR_RATE * CLEAR_RATE * variance:
         row[at] = -rate
     else:
@@ -136,28 +155,19 @@ def replace_length(p, f, c, residual):
 
 
 @inner
-def take_reading(p, f, channel, residual, variance, age):
-    """Correct the estimate by a residual of the quantity in `f.row`, `age` s old, of a measured channel.
+def take_reading(p, f, channel, residual, variance):
+    """Correct the estimate by a residual of the quantity in `f.row` of a measured channel.
 
     Its noise is learnt: innovations that are larger than expected raise it until they are as expected. The evidence
     scales innovations by their recent mean square: a model gains nothing by stating a smaller variance.
     """
-    size, every, m = zero_place(p), all_states(p), p.modes[0]
-    n, drive = p.drives.shape[0], drive_place(p)
-    if age > 0.0:
-        for j in range(m):
-            q, v = f.row[j], f.row[m + j]
-            f.row[j], f.row[m + j] = q + age * p.omega[j] * p.omega[j] * v, v - age * (q - p.decay[j] * v)
-        for i in range(n):
-            f.row[drive + n + i] -= age * f.row[drive + i]
-    f.row[size + p.channels[channel].zero] = 1.0
+    every = all_states(p)
     variance *= max(f.excess[channel], 1.0)
     shown, likelihood, ratio = 0.0, 0.0, f.ratio[channel]
     for k in range(ALL_VALVES, ALL_OPEN + 1):
         innovation = residual
         for i in range(every):
-            known = f.mean[PREDICTION, i] if i < size else 0.0
-            innovation -= f.row[i] * (f.x[k, i] - known)
+            innovation -= f.row[i] * (f.x[k, i] - f.mean[PREDICTION, i])
         expected = variance + variance_of(f.row, f.p[k], f.gain, every)
         normalised2 = innovation * innovation / expected
         shown += f.chances[k] * normalised2

@@ -17,6 +17,7 @@ VALVES, OPEN, BURST, ALL_VALVES, ALL_OPEN = range(5)  # models: three of the pre
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
 LOADS = 6  # states of the load at the tip: along x and y its fast part (2), its slow part (2), rates of the fast part (2)
 FED, FED_STAMP = range(2)  # of `status`
+DELAYED = 128  # states at most that hold readings of late streams, see `delayed`
 
 
 class SensorNoise(NamedTuple):
@@ -45,7 +46,9 @@ class Filters(NamedTuple):
     excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
     drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
     m^2. before, interval : (n, 3), (2,) the three lengths before (m); times between the newest two, and of `weights`, s.
-    lags : (streams,) by which stamps are late, as estimated, s.
+    lags, late : (streams,) by which stamps are late, as estimated, and by which samples arrived after their stamps at most, s.
+    copies : (c,) places of late channels among the copies of one instant, -1 of others. instants : (DELAYED,) stamps of copies,
+    see `delayed`.
     bends : (sites, 2) accelerations that the curved ways of sites need, m/s^2. sway2 : (n,) square of the largest angle by
     which an inclinometer lately erred, rad^2.
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
@@ -80,6 +83,9 @@ class Filters(NamedTuple):
     bends: Array
     sway2: Array
     lags: Array
+    late: Array
+    copies: NDArray[np.int64]
+    instants: NDArray[np.int64]
     noise: SensorNoise
     places: NDArray[np.int64]
     weights: Array
@@ -106,7 +112,7 @@ class Filters(NamedTuple):
 def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoise) -> Filters:
     """Return filters of a boom with so many joints, modes at most, and these measured channels."""
     n, channels, sites, behind = joints, len(measured.channels), len(measured.sites), 4 + 2 * joints + len(measured.errors)
-    states = 2 * modes + LOADS + 3 * joints + behind
+    states = 2 * modes + LOADS + 3 * joints + behind + DELAYED
     return Filters(
         x=np.zeros((5, states)), p=np.zeros((5, states, states)), chances=np.zeros(5), mean=np.zeros((2, states)),
         spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
@@ -114,6 +120,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
         sway2=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,
+        late=np.zeros(len(Stream)), copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         places=np.zeros((states, 8 + n), np.int64), weights=np.zeros((states, 8 + n)), counts=np.zeros(states, np.int64),
         variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
         half=np.zeros((states, states)), turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)),
@@ -146,6 +153,12 @@ def zero_place(p):
 
 
 @inner
-def all_states(p):
-    """Return the number of states of the estimate; errors of further sensors are among them from their first reading on."""
+def copy_place(p):
+    """Return the first place of the copies of late readings; errors of sensors stand before from their first reading on."""
     return zero_place(p) + p.behind[0]
+
+
+@inner
+def all_states(p):
+    """Return the number of states of the estimate."""
+    return copy_place(p) + p.delayed[0]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..kernels.elements.linkage import angle_of_length
 from ..kernels.integrators import X
 from ..kernels.jit import inner, kernel
@@ -31,6 +33,7 @@ from .rows import (
     about_rest,
     acceleration_row,
     column_row,
+    difference,
     drive_row,
     force_row,
     length_of,
@@ -45,6 +48,7 @@ from .sensor_model import specific_force
 from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, drive_place, force_place, zero_place
 
 PATIENCE = 1_000_000_000  # ns without readings after which the estimate is the prediction again
+FOLLOW = np.bool_(True)  # of `linearise`, see `boom_twin.kernels.transfer.time_step.ANEW`
 ANGLE_STEP = 0.01  # rad that a joint turns by before the boom is linearised anew
 
 
@@ -78,7 +82,7 @@ def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
     for i in range(n):
         turned = max(turned, abs((f.mean[PREDICTION, drive + i] - p.drives[i]) * p.slope[i]))
     if turned > ANGLE_STEP:
-        status = linearise(t, boom, work, p, f.mean[PREDICTION, drive : drive + n], True)
+        status = linearise(t, boom, work, p, f.mean[PREDICTION, drive : drive + n], FOLLOW)
         if status != OK:
             return status
     if f.status[FED] == 1 and stamp - f.status[FED_STAMP] > PATIENCE:
@@ -251,13 +255,14 @@ def rigid_tip(t, p, lengths):
 def write_tip_estimate(p, f, results, out):
     """Write the estimate beside the newest prediction; see `boom_twin.deviation.estimate_row.WIDTH`."""
     n, m, size, load = p.drives.shape[0], p.modes[0], zero_place(p), force_place(p)
+    mean, expected = f.mean[ESTIMATE], f.mean[PREDICTION]
     for a in range(3):
         column_row(p, p.readings, n + a, 1.0, f.rows[a])
         rate_row(p, n + a, f.rows[3 + a])
         acceleration_row(p, n + a, f.rows[6 + a])
-        out[TIP_AT + a] = results.tip[0, a] + difference(f, f.rows[a], size)
-        out[VELOCITY + a] = results.tip[1, a] + difference(f, f.rows[3 + a], size)
-        out[ACCELERATION + a] = results.tip[2, a] + difference(f, f.rows[6 + a], size)
+        out[TIP_AT + a] = results.tip[0, a] + difference(f.rows[a], mean, expected, size)
+        out[VELOCITY + a] = results.tip[1, a] + difference(f.rows[3 + a], mean, expected, size)
+        out[ACCELERATION + a] = results.tip[2, a] + difference(f.rows[6 + a], mean, expected, size)
     write_covariance(f, 0, size, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     write_covariance(f, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
     write_covariance(f, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
@@ -269,15 +274,6 @@ def write_tip_estimate(p, f, results, out):
         fast, slow = load + a, load + 2 + a
         out[FORCE + a] = f.mean[ESTIMATE, fast] + f.mean[ESTIMATE, slow]
         out[FORCE_VARIANCE + a] = covariance[fast, fast] + 2.0 * covariance[fast, slow] + covariance[slow, slow]
-
-
-@inner
-def difference(f, row, size):
-    """Return the reading of a row by the estimate less that by the prediction."""
-    total = 0.0
-    for k in range(size):
-        total += row[k] * (f.mean[ESTIMATE, k] - f.mean[PREDICTION, k])
-    return total
 
 
 @inner

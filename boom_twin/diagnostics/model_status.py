@@ -9,8 +9,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from ..analysis.bending_moments import stations
-from ..analysis.bending_stress import BendingStressModel
+from ..analysis.bending_stress import BendingStressModel, stations
 from ..deviation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms, repeated, values_of
 from ..health.deviations import KIND as DEVIATION

@@ -1,18 +1,138 @@
-"""Status of a sensor: measuring, stuck or silent."""
+"""Statistics and status of the sensors of a stream: measuring, stuck or silent."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isnan
+from math import inf, isnan, nan
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..config.settings import Settings
 from ..health.sensor_check import readings_of_frozen, sensor_ranges
 from ..scene.schema import Scene
 from ..texts import alarm_text
-from ..types import SENSORS, Mount, Stream
+from ..types import NANO, SENSORS, Array, Mount, Sample, Stream
 from .levels import Bounds, ComponentJudge, Status
-from .stream_stats import ChannelStats
+
+LONGEST_PAUSE = 10.0  # longest step of stamps (s) that is a pause of the sensor; a longer one is a jump of its clock
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelStats:
+    """Statistics of one sensor since the last look."""
+
+    value: float  # newest reading, in the sensor's unit; NaN before the first one
+    stamp: int  # stamp of `value`, ns; 0 before the first one
+    rate: float  # readings a second, by their stamps; NaN if fewer than two
+    gap: float  # longest step between their stamps, s
+    gaps: int  # steps longer than permitted, since listening began
+    missing: float  # share of the messages without a finite value; NaN without messages
+    outside: float  # share of the messages with a value out of range; NaN without messages
+    unchanged: int  # consecutive readings, up to the newest, that repeat the one before
+
+
+class Channel:
+    """Computation of the statistics of one sensor; `low` and `high` are its range, in its unit."""
+
+    def __init__(self, low: float = -inf, high: float = inf) -> None:
+        self._low, self._high = low, high
+        self._value, self._stamp, self._unchanged, self._gaps = nan, 0, 0, 0
+
+    def look(self, stamps: NDArray[np.int64], values: Array, refused: int, longest: float) -> ChannelStats:
+        """Return the statistics of `values` (k,) with `stamps` (k,) in ns; NaN where the message had no value.
+
+        `refused` further messages had no usable value; `longest` (s) is the largest permitted step of stamps.
+        """
+        messages, usable = len(values) + refused, np.isfinite(values)
+        stamps, values, steps = stamps[usable], values[usable], np.zeros(0)
+        if len(values):
+            steps = np.diff(stamps, prepend=self._stamp or stamps[0]) * NANO
+            steps = steps[(steps > 0.0) & (steps <= LONGEST_PAUSE)]
+            changes = np.flatnonzero(np.diff(values, prepend=self._value) != 0.0)  # also the first reading ever
+            self._unchanged = len(values) - 1 - int(changes[-1]) if len(changes) else self._unchanged + len(values)
+            self._value, self._stamp = float(values[-1]), int(stamps[-1])
+        outside = np.count_nonzero((values < self._low) | (values > self._high))
+        total = float(steps.sum())
+        self._gaps += int(np.count_nonzero(steps > longest))
+        return ChannelStats(
+            value=self._value,
+            stamp=self._stamp,
+            rate=len(steps) / total if total > 0.0 else nan,
+            gap=float(steps.max(initial=0.0)),
+            gaps=self._gaps,
+            missing=1.0 - len(values) / messages if messages else nan,
+            outside=outside / messages if messages else nan,
+            unchanged=self._unchanged,
+        )
+
+
+class StreamWatch:
+    """Statistics of one stream, computed when `look` is called. Times are in s, stamps in ns.
+
+    Attributes
+    ----------
+    lag : float
+        Least time from stamp to arrival between the last two looks, s; NaN without messages. It contains an unknown clock
+        offset. The difference of two streams' lags is the offset between their clocks.
+    """
+
+    def __init__(self, ranges: Array, monotonic: Callable[[], float] = time.monotonic) -> None:
+        self._ranges, self._monotonic = ranges.tolist(), monotonic
+        self.count = 0  # messages, since the beginning
+        self.begin()
+
+    def begin(self) -> None:
+        """Start listening; reset everything but the count."""
+        self.newest: int | None = None
+        self._heard, self._looked_count, self._least, self.lag = self._monotonic(), self.count, nan, nan
+        self._counted = nan, 0
+        self._channels = [Channel(*bounds) for bounds in self._ranges]
+        self._stamps, self._values = list[int](), list[Array]()  # of samples
+
+    def seen(self, stamp: int) -> None:
+        """Count a message."""
+        self.count += 1
+        self.newest = stamp
+        self._heard = now = self._monotonic()
+        lag = now - stamp * NANO
+        if not lag >= self._least:
+            self._least = lag
+
+    def took(self, sample: Sample) -> None:
+        """Take the sample of a message. A refused message has none."""
+        self._stamps.append(sample.stamp)
+        self._values.append(sample.values.copy())
+
+    def age(self, now: float) -> float:
+        """Return the time since the last message, or since listening began."""
+        return now - self._heard
+
+    def age_of(self, stats: ChannelStats, now: float) -> float:
+        """Return the time since a channel's last reading, or since listening began.
+
+        Up to the newest message, time is taken from stamps.
+        """
+        if self.newest is None or not stats.stamp:
+            return self.age(now)
+        return self.age(now) + max(0, self.newest - stats.stamp) * NANO
+
+    def arrival_rate(self, now: float) -> float:
+        """Return the messages a second since the last call; NaN at the first."""
+        (time, count), self._counted = self._counted, (now, self.count)
+        return (self.count - count) / (now - time) if now > time else nan
+
+    def look(self, longest: float) -> list[ChannelStats]:
+        """Return the statistics of every channel since the last look; `longest` (s) is the largest permitted step of stamps."""
+        stamps, table = np.array(self._stamps, np.int64), np.reshape(self._values, (-1, len(self._channels)))
+        self._stamps, self._values = [], []
+        refused = max(0, self.count - self._looked_count - len(stamps))
+        self._looked_count = self.count
+        self.lag, self._least = self._least, nan
+        return [channel.look(stamps, table[:, i], refused, longest) for i, channel in enumerate(self._channels)]
+
 
 SLOW = 2.0  # largest step of stamps that is no gap at any rate, in sampling periods
 RANGE_MARGIN = 5.0  # tolerance of a sensor's range, in standard deviations of its noise

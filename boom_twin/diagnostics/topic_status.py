@@ -1,4 +1,4 @@
-"""Statuses of the topics: publishers, subscribers, rates, ages, clocks, lost and waiting messages."""
+"""Statuses of the topics and of a recording: publishers, rates, ages, clocks, lost and waiting messages, disk."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from math import nan
 
 from ..types import NANO, SECOND, Stream
 from .levels import Bounds, ComponentJudge, Level, Status
-from .stream_stats import StreamWatch
+from .sensor_status import StreamWatch
 
 OTHER_USER = (
     "If it sends as another user of this machine, which shared memory keeps apart: run both as one user, or set "
@@ -124,17 +124,12 @@ class ReceptionWatch:
 
     def __init__(self) -> None:
         self._before: dict[str, Reception] = {}
-        self._left_out: dict[str, int] = {}
 
-    def status(self, judge: ComponentJudge, topics: Mapping[str, Reception], left_out: Mapping[str, int]) -> Status:
-        """Return the status; `left_out` is the total work left out for lack of time, by kind."""
+    def status(self, judge: ComponentJudge, topics: Mapping[str, Reception]) -> Status:
+        """Return the status."""
         for name, each in topics.items():
             self._check(judge, name, each)
-        for name, count in left_out.items():
-            new = count - self._left_out.get(name, 0)
-            told = f"too many messages for the time there is: {name} left out, predictions complete"
-            judge.check(f"{name} left_out", new, Bounds(warn=0), told, at_once=True)
-        self._before, self._left_out = dict(topics), dict(left_out)
+        self._before = dict(topics)
         return judge.finish("all that arrives is read at once")
 
     def _check(self, judge: ComponentJudge, name: str, each: Reception) -> None:
@@ -152,3 +147,45 @@ class ReceptionWatch:
         judge.check(f"{name} wait_s", each.wait, Bounds(thresholds.wait_warn, thresholds.wait_error), told)
         if not each.is_numbered:
             judge.note({f"{name} lost": "unknown: numbers of several publishers, or of one that started anew"})
+
+
+ENDED = "ended"  # key with value 1 in the last status of a recording
+
+
+@dataclass(frozen=True, slots=True)
+class DiskState:
+    """State of a recording's files and of the disk."""
+
+    lag: float  # age of the oldest message that a power failure would lose, s
+    waiting: int  # bytes of messages in memory
+    written: int  # bytes of all files
+    free: int  # free bytes of the disk
+    left: float  # time until the disk is full at this recording's mean rate, s
+
+
+@dataclass(frozen=True, slots=True)
+class TopicCount:
+    """Message counts of one topic. `missed`: left out or not received; None unless there was one publisher."""
+
+    topic: str
+    received: int
+    written: int
+    missed: int | None
+
+
+def recording_status(judge: ComponentJudge, counts: Sequence[TopicCount], disk: DiskState, end: str | None) -> Status:
+    """Return the status of a recording. `end` is the fault that ended it, empty without one, None while it runs."""
+    thresholds, missed = judge.at.thresholds, sum(count.missed or 0 for count in counts)
+    if end:
+        judge.fault(Level.ERROR, end)
+    judge.check("never_arrived", missed, Bounds(warn=0), "messages were published and never arrived")
+    told = "messages wait too long to be written to the disk"
+    judge.check("lag_s", disk.lag, Bounds(thresholds.lag_warn, thresholds.lag_error), told)
+    room = Bounds(thresholds.disk_warn, thresholds.disk_error, low=True)
+    judge.check("disk_left_s", disk.left, room, "the disk will soon be full")
+    judge.note({} if end is None else {ENDED: 1})
+    judge.note({"disk_free_bytes": disk.free, "waiting_bytes": disk.waiting, "written_bytes": disk.written})
+    for count in counts:
+        missing = "nan" if count.missed is None else count.missed
+        judge.note({f"received {count.topic}": count.received, f"never_arrived {count.topic}": missing})
+    return judge.finish("running" if end is None else "ended")

@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
 from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Thresholds
-from ..types import SENSORS, Health, Report, Sample, Stream
+from ..types import SENSORS, Array, Health, Report, Sample, Stream
 from .levels import ComponentJudge, Evaluation, Level, Status, Value
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, SwingWatch, stress_status
-from .sensor_status import SensorSpec, sensor_status
-from .stream_stats import Rows, StreamWatch
+from .sensor_status import SensorSpec, StreamWatch, sensor_status
 from .topic_status import Peers, Reception, ReceptionWatch, outputs_status, publishers_status, seconds, topic_status
-
-
-def all_pieces(look: Generator[None, None, list[Status]]) -> list[Status]:
-    """Run all parts of `TwinWatch.look` at once and return its result."""
-    while True:
-        try:
-            next(look)
-        except StopIteration as end:
-            return list(end.value)
 
 
 class TwinWatch:
@@ -56,7 +47,7 @@ class TwinWatch:
         self._judges: dict[str, ComponentJudge] = {}
         drive = "strokes" if self._drive is Stream.STROKES else "angles"
         self._model, self._load, self._swing = ModelWatch(self._looked, drive), LoadWatch(), SwingWatch()
-        self._rows: dict[tuple[str, ...], Rows] = {}  # normalised residuals, by channels
+        self._rows = defaultdict[tuple[str, ...], list[Array]](list)  # normalised residuals, by channels
         self._residuals: dict[str, ResidualWindow] = {}
         self._newest: Report | None = None  # newest with a prediction
         self._silent: set[Stream] = set()
@@ -74,8 +65,7 @@ class TwinWatch:
         for each in report.all:
             self._model.took(each, duration if each is report else 0.0)
             for residuals in each.residuals:
-                rows = self._rows.setdefault(residuals.names, Rows(len(residuals.names)))
-                rows.append(residuals.normalised)
+                self._rows[residuals.names].append(residuals.normalised)
             if each.prediction is not None:
                 self._newest = each
             self._swing.took(each)
@@ -124,12 +114,9 @@ class TwinWatch:
         clock: float,
         reception: Mapping[str, Reception] | None = None,
         wrong_names: Mapping[Stream, tuple[Level, str]] | None = None,
-        left_out: Mapping[str, int] | None = None,
         words: Mapping[str, str] | None = None,
-    ) -> Generator[None, None, list[Status]]:
+    ) -> list[Status]:
         """Return the statuses of model, topics, health, sensors and residuals; while `idle`, of the model only.
-
-        It yields between parts of one or two milliseconds, so that a live node can take samples.
 
         Parameters
         ----------
@@ -143,8 +130,6 @@ class TwinWatch:
             Reception by name of the topic; None if nothing is received live.
         wrong_names : dict of Stream to tuple of Level and str, optional
             Faults of inputs whose messages have names unknown to the scene.
-        left_out : dict of str to int, optional
-            Work left out for lack of time since the node was configured, by kind.
         """
         at = Evaluation(self.thresholds, self._monotonic(), clock)
 
@@ -157,12 +142,8 @@ class TwinWatch:
             return found
         sensors, longest = list[Status](), self.thresholds.gap_warn
         for stream, watch in self._streams.items():
-            yield
-            at = Evaluation(self.thresholds, self._monotonic(), clock)
             for sensor, stats in zip(self._sensors[stream], watch.look(longest), strict=True):
                 sensors.append(sensor_status(judge(f"sensor {sensor.name}"), sensor, stats, watch.age_of(stats, at.now)))
-        yield
-        at = Evaluation(self.thresholds, self._monotonic(), clock)
         strokes = self._streams[self._drive].lag
         for stream, watch in self._streams.items():
             if stream not in self._names:
@@ -174,7 +155,7 @@ class TwinWatch:
             streams = {stream: self._streams[Stream(SENSORS[stream].gives or stream)] for stream in publishers}
             followed = {stream: seconds(each.newest) for stream, each in streams.items()}
             found.insert(0, publishers_status(judge("publishers"), publishers, followed))
-            found.append(self._reception.status(judge("reception"), reception, left_out or {}))
+            found.append(self._reception.status(judge("reception"), reception))
         found.append(outputs_status(judge("outputs"), subscribers))
         if self.health is not None:
             found.append(self.health.status(judge("health")))
@@ -182,17 +163,14 @@ class TwinWatch:
             found.append(load)
         if self._newest is not None:
             found.append(self._swing.status(judge("swing")))
-        yield
         if self._stress is not None and self._newest is not None and self._newest.prediction is not None:
             bending = judge("bending")
             found.append(stress_status(bending, self._stress, self._newest.prediction, self._newest.estimate))
-        rows, self._rows = self._rows, {}
-        for names, kept in rows.items():
-            yield
-            for name, column in zip(names, kept.table().T, strict=True):
+        for names, kept in self._rows.items():
+            for name, column in zip(names, np.transpose(kept), strict=True):
                 window = self._residuals.setdefault(name, ResidualWindow(self._looked))
-                window.take(column, self._monotonic())
-        at = Evaluation(self.thresholds, self._monotonic(), clock)
+                window.take(column, at.now)
+        self._rows.clear()
         self._looked = at.now
         return found + sensors + [self._residual(judge(f"residual {name}"), name) for name in self._residuals]
 

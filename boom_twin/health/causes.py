@@ -1,12 +1,12 @@
 """Fault hypotheses of a boom, and the decision which of them is named.
 
 Every second gives each hypothesis a gain: its log likelihood less that of the boom as believed. The evidence of a hypothesis is
-the sum of its gains since the best onset. A cause is named if its posterior probability is high. Three facts limit the gains.
+the sum of its gains since the best onset. A cause is named if its posterior probability is high. Three facts limit that.
 
 - Successive innovations are not independent. So likelihoods are raised to the power `TEMPER`.
-- An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. Its probability,
-  exp(-`MOST_GAIN`), bounds the likelihood ratio of a second.
-- A load from the start belongs to the scene. A new load must gain faster than before its onset.
+- An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. The likelihood of such a
+  second is the same for all, exp(-`MOST_GAIN`) times the best.
+- Parameters of a healthy boom are wrong by `WRONG`. The size of a named fault must exceed what that looks like.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..deviation.predictor import LAG_FLOOR
 from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
 from ..scene.summary import explain
@@ -25,12 +26,11 @@ from ..types import Alarm, Array, Stream, StrokeReading, channels_of
 from .alarms import UNKNOWN
 
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
-LATE = 0.02  # s, delay of the angles
+LATE = 0.02  # s, delay of the stamps of a stream
+WRONG = 0.02  # relative standard deviation of each parameter of a healthy boom
 HEAD_START = 30.0  # nats of the hypothesis without a fault; parameters with 2 % of error gain as much
 TEMPER = math.log(20.0) / 25.0  # power of likelihoods: 25 nats more make a cause 20 times as probable
-MOST_GAIN = 12.0  # nats, limit of the gain of a second
-FASTER = 1.5  # ratio of gain rates after and before the onset, which a load must exceed
-KNOWN_LOAD = 10  # s at the beginning of the gains kept, without onset of a load: it could be the scene's
+MOST_GAIN = 12.0  # nats by which the likelihood of a second is below the best, at most
 MEMORY = 60  # s of gains that are kept
 
 
@@ -102,7 +102,7 @@ def _springs(scene: Scene) -> list[str]:
 
 
 def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
-    """Return all single faults that are compared for a boom, without zeros and delay of angles that drive the model.
+    """Return all single faults that are compared for a boom, without zeros of angles that drive the model.
 
     Three give no alarm. Warm oil softens all cylinders. The outermost section bends mostly in modes that the filter leaves out.
     The zero of the IMU looks like model errors in fast moves.
@@ -120,7 +120,21 @@ def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -
     found += [
         Fault(f"{name}.sensor", "off", is_told=name != "tip_imu") for name in (*angles, "tip_imu", *names_of[Stream.FORCES])
     ]
-    return [*found, Fault(f"{Stream.ANGLES.value}.delay", "late", LATE)] if angles else found
+    streams = dict.fromkeys((reads.stream, Stream.ANGLES, Stream.IMU, Stream.FORCES))
+    return [*found, *(Fault(f"{stream.value}.delay", "late", LATE) for stream in streams)]
+
+
+def usual_size(scene: Scene, fault: Fault) -> float:
+    """Return the standard deviation of what looks like a fault in a healthy boom, whose parameters are wrong by `WRONG`.
+
+    Masses of n equal sections, each wrong by itself, turn a straight boom of mass M as a payload of `WRONG` M / sqrt(3 n).
+    """
+    if fault.kind == "softer":
+        return WRONG
+    if not fault.is_load:
+        return LAG_FLOOR if fault.kind == "late" else 0.0
+    payload = WRONG * explain(scene).mass / math.sqrt(3.0 * len(scene.sections))
+    return payload if fault.cause == "tip.payload" else 2.0 * payload / scene.reach
 
 
 class Verdict(NamedTuple):
@@ -148,20 +162,21 @@ class Evidence:
     def __init__(self, faults: Sequence[Fault], odds: float) -> None:
         self._odds = odds
         self._faults, none = tuple(faults), np.zeros(len(faults))
-        self._comes = np.array([fault.is_load for fault in faults], bool)
         self._gains, self._stamps = deque([none], maxlen=MEMORY), deque([0], maxlen=MEMORY)
 
-    def take(self, stamp: int, gains: Array) -> Verdict | None:
-        """Take the gains of a second that begins at a stamp (ns); return the verdict if a fault is named.
+    def take(self, stamp: int, likelihoods: Array) -> Verdict | None:
+        """Take the log likelihoods of a second that begins at a stamp (ns); return the verdict if a fault is named.
 
         Parameters
         ----------
-        gains : ndarray, shape (faults,)
-            nats.
+        likelihoods : ndarray, shape (1 + faults,)
+            That of the boom as believed first, nats.
         """
-        self._gains.append(self._gains[-1] + np.clip(gains, -MOST_GAIN, MOST_GAIN))
+        bounded = np.maximum(likelihoods, likelihoods.max() - MOST_GAIN)
+        self._gains.append(self._gains[-1] + bounded[1:] - bounded[0])
         self._stamps.append(stamp)
-        evidence, onsets = self._rises()
+        rises = self._gains[-1] - np.array(self._gains)
+        evidence, onsets = rises.max(axis=0), len(rises) - 1 - rises[::-1].argmax(axis=0)
         causes = {"": HEAD_START}
         for fault, rise in zip(self._faults, evidence.tolist(), strict=True):
             causes[fault.cause] = max(causes.get(fault.cause, 0.0), rise)
@@ -173,16 +188,7 @@ class Evidence:
         ranked = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])
         shown = ranked[:3]
         shown.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in shown))))
-        return Verdict(best, self._stamps[min(onsets[best] + 1, len(self._stamps) - 1)], tuple(shown))
-
-    def _rises(self) -> tuple[Array, list[int]]:
-        """Return the evidence of each fault since its best onset, and the index of that onset among the seconds kept."""
-        gains, seconds = np.array(self._gains), np.arange(len(self._gains))[:, None]
-        before = (gains - np.minimum.accumulate(gains, axis=0)) / np.maximum(seconds, 1)  # nats per s
-        rises = gains[-1] - gains - np.where(self._comes, FASTER * before, 0.0) * (len(gains) - 1 - seconds)
-        rises[self._comes & (seconds < KNOWN_LOAD)] = 0.0
-        latest = len(gains) - 1 - rises[::-1].argmax(axis=0)
-        return np.maximum(rises.max(axis=0), 0.0), latest.tolist()
+        return Verdict(best, self._stamps[min(int(onsets[best]) + 1, len(self._stamps) - 1)], tuple(shown))
 
 
 def evidence_of(fault: Fault, spread: float) -> str:

@@ -10,10 +10,12 @@ node and a replay give it with the same sample.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
+from statistics import NormalDist
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -21,12 +23,25 @@ import numpy as np
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
-from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, evidence_of, hypothesis, possible_faults
+from .causes import (
+    MEMORY,
+    TEMPER,
+    Evidence,
+    Fault,
+    Hypothesis,
+    Verdict,
+    evidence_of,
+    hypothesis,
+    possible_faults,
+    usual_size,
+)
 from .creep import SPAN, CreepMonitor
 from .sensor_check import Flags
 
 SIZES = 0.4, 0.7, 1.0, 1.4, 1.8  # trial sizes over the hypothesised size, to estimate the size of a named fault
-CERTAIN = 3.0  # least size of a named fault in its standard deviations
+LAG_SIZES = tuple(0.25 * step for step in range(1, 11))  # the same of a lag, whose likelihood is no parabola further away
+LARGER = 1.4  # ratio of each further trial size to the one before, while the largest explains most
+IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
 CAME_BACK = 0.3  # remaining share of a zero's change, below which the fault has ended
 SPACING = 18_000_000  # ns, least time between samples of a stream: 50 Hz suffice for all motion of the boom
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
@@ -45,7 +60,7 @@ class Follower(Protocol):
     def requests(self) -> Any:
         """Requested changes that wait for the next stroke sample."""
 
-    def update_block(self, block: Any, /) -> object:
+    def take(self, block: Any, /) -> object:
         """Take the samples of a block."""
 
     def zeros(self, channels: Collection[str], /) -> tuple[Array, Array]:
@@ -226,7 +241,7 @@ class FaultTwins:
             return []
         if (fault := self._back_again()) is not None:
             return self._ended(fault, stamp)
-        verdict = self._decision.take(stamp, grown[1:] - grown[0])
+        verdict = self._decision.take(stamp, grown)
         return [] if verdict is None else self._name(verdict, stamp)
 
     def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
@@ -243,7 +258,8 @@ class FaultTwins:
         if fault in self._named:
             return self._ended(fault, verdict.onset)
         sized, spread = self._sized(fault, verdict.onset)
-        if abs(sized.size) < CERTAIN * spread:
+        spread = math.hypot(spread, usual_size(self._scene, fault))
+        if abs(sized.size) < NormalDist().inv_cdf(0.5 + 0.5 * self._odds) * spread:
             self._decide_anew()
             return []
         ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
@@ -273,8 +289,12 @@ class FaultTwins:
         """Return a fault with its most likely size, and the standard deviation, by twins over the recent seconds."""
         if fault.kind == "off":
             return self._change_of_zero(fault, onset)
-        sizes = np.array(SIZES) * fault.size
-        totals = [self._total(fault._replace(size=size), onset) for size in sizes.tolist()]
+        tried = [size * fault.size for size in (LAG_SIZES if fault.kind == "late" else SIZES)]
+        totals = [self._total(fault._replace(size=size), onset) for size in tried]
+        while totals[-1] > max(totals[:-1]):
+            tried.append(LARGER * tried[-1])
+            totals.append(self._total(fault._replace(size=tried[-1]), onset))
+        sizes = np.array(tried)
         best = min(max(int(np.argmax(totals)), 1), len(sizes) - 2)
         near = slice(best - 1, best + 2)
         curve, slope, _ = np.polyfit(sizes[near] - sizes[best], totals[near], 2)  # a log likelihood is a parabola at its top
@@ -284,14 +304,14 @@ class FaultTwins:
         return fault._replace(size=size), float((-2.0 * TEMPER * curve) ** -0.5)
 
     def _total(self, fault: Fault, onset: int) -> float:
-        """Return the log likelihood of the recent seconds since the onset; -1e9 for an impossible boom."""
+        """Return the log likelihood of the recent seconds since the onset; `IMPOSSIBLE` for an impossible boom."""
         start = now = 0.0
         try:
             for stamp, twin in self._repeated(fault):
                 now = twin.evidence
                 start = now if stamp < onset else start
         except BoomTwinError:
-            return -1e9
+            return IMPOSSIBLE
         return now - start
 
     def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float]:
@@ -318,7 +338,7 @@ class FaultTwins:
 def _feed(twin: Follower, each: Hypothesis, second: _Second) -> None:
     if second.left_out is not None:
         twin.leave_out(*second.left_out)
-    twin.update_block(_in_time(second.block, each))
+    twin.take(_in_time(second.block, each))
 
 
 def _in_time(block: Any, each: Hypothesis) -> Any:

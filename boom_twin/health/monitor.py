@@ -132,19 +132,22 @@ class HealthMonitor:
         masked = self._sensors[stream].masked | self._wiring.wrong(stream)
         return masked | (stream is Stream.ANGLES and self._delay.alarm is not None)
 
-    def judge(self, stamp: int, load: tuple[Array, Array], tip_sigmas: Callable[[], Array]) -> Health | None:
+    def judge(self, stamp: int, loads: tuple[Array, Array], tip_sigmas: Callable[[], Array]) -> Health | None:
         """Judge the blocks that strokes with `stamp` (ns) complete; return None if there is nothing to report.
 
         Parameters
         ----------
-        load : two ndarray, shape (2,)
-            Estimated force at the tip that the model does not know, N, and its variances.
+        loads : two ndarray, shape (2, 2)
+            Force at the tip that the model does not know, predicted and estimated, N, and its variances.
         tip_sigmas : callable
             Asked, if there is something to tell, for the standard deviations of the predicted tip, m, shape (2,).
         """
         done = self._blocks.close(stamp)
         news = [alarm for block in done if block.followed for alarm in self._judge(block)]
-        news += self._load.take(stamp, *load)
+        if any(alarm.kind == "late" for alarm in self._named):  # late readings look like forces
+            self._load.begin()
+        else:
+            news += self._load.take(stamp, *loads)
         if done and self.fault_twins is not None:
             news += self.fault_twins.news(done[-1].end)
         if not done or not (news or done[-1].end - self._told >= PERIOD or self._told > done[-1].end):
@@ -158,16 +161,20 @@ class HealthMonitor:
         }
         return Health(self._told, tuple(alarms), tip_sigmas(), noise)
 
+    @property
+    def _named(self) -> list[Alarm]:
+        """Alarms of named causes that last."""
+        return [] if self.fault_twins is None else self.fault_twins.alarms
+
     def _lasting(self) -> Iterable[Alarm]:
         """Yield all alarms that last."""
         for sensors in self._sensors.values():
             yield from (alarm for alarm in sensors.alarms if not self._wiring.explains(alarm))
         yield from self._wiring.alarms
         yield from (alarm for alarm in (self._delay.alarm, self._load.alarm) if alarm is not None)
-        named = [] if self.fault_twins is None else self.fault_twins.alarms
         for stream, deviations in self._deviations.items():
-            yield from (alarm for alarm in deviations.alarms if not any(explains(each, stream, alarm) for each in named))
-        yield from named
+            yield from (alarm for alarm in deviations.alarms if not any(explains(each, stream, alarm) for each in self._named))
+        yield from self._named
 
     def _judge(self, block: Block) -> list[Alarm]:
         """Return the alarms that a block begins or ends."""

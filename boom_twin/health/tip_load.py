@@ -1,16 +1,19 @@
 """Alarm of a force at the tip that the model does not know and that is above a set limit: ``tip.load``.
 
 Pumps and wind are no fault. A force above the limit is an overload, an obstacle at the tip, or a load that the scene lacks.
+A force that the cylinder lengths alone contradict is none: late or wrong readings of other sensors look like that.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from ..types import Alarm, Array, Ranked
 
 CAUSE = "tip.load"
-CERTAIN = 3.0  # standard deviations by which the estimated force has to be above the limit
+CERTAIN = 3.0  # standard deviations by which a force is above the limit, or contradicts the lengths
 AFTER, OVER = 2_000_000_000, 6_000_000_000  # ns from the first passing to a later one that raises it; without one, to its end
 
 
@@ -38,15 +41,17 @@ class TipLoadMonitor:
         self._since = self._last = 0
         self._largest = 0.0, 0.0
 
-    def take(self, stamp: int, load: Array, variances: Array) -> list[Alarm]:
-        """Take the estimated force (2,) in N with its variances at `stamp` (ns); return an alarm that began or ended."""
-        size = float((load @ load) ** 0.5)
-        sigma = float((variances @ load**2) ** 0.5) / max(size, 1e-300)
+    def take(self, stamp: int, loads: Array, variances: Array) -> list[Alarm]:
+        """Take forces (2, 2), predicted and estimated, in N, with variances at `stamp` (ns); return what began or ended."""
+        size = max(float((loads[1] @ loads[1]) ** 0.5), 1e-300)
+        direction = loads[1] / size
+        predicted = float(direction @ loads[0])
+        doubt, sigma = np.sqrt(variances @ direction**2).tolist()
         if self._since and stamp - self._last > OVER:
             ended = [] if self.alarm is None else [replace(self.alarm, until=self._last)]
             self.begin()
             return ended
-        if size - CERTAIN * sigma <= self._limit:
+        if size - CERTAIN * sigma <= self._limit or size > predicted + CERTAIN * doubt:
             return []
         self._since, self._last = self._since or stamp, stamp
         self._largest = max(self._largest, (size, sigma))

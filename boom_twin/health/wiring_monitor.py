@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 
 from ..scene.schema import Scene
 from ..types import SENSORS, Alarm, Array, Mount, Place, Ranked, Stream, StrokeReading, channels_of, streams_of
-from ..wiring.check import Checked, check
-from ..wiring.expected import RestModel
-from ..wiring.readings import Channel, Series, Window, is_checked
-from ..wiring.words import channel_name, likely
+from ..wiring.check import Checked, channel_name, check, likely
+from ..wiring.readings import Channel, RestModel, Series, Window, is_checked
 from .blocks import Block, means_of
 
 KIND = "wiring"  # kind of all its alarms

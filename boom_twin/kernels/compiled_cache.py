@@ -28,8 +28,8 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNEL_SOURCES = (
-    "kernels", "analysis/cylinder_drives.py", "analysis/equilibrium.py", "deviation", "twin/update.py",
-    "twin/state.py", "twin/regular.py", "twin/blocks.py",
+    "kernels", "analysis/equilibrium.py", "deviation", "twin/update.py",
+    "twin/state.py",
     "calibration/rest_filter.py",
     "health/sensor_survey.py", "health/sensor_findings.py", "types.py", "sensor_kinds.py",
 )  # fmt: skip

@@ -9,7 +9,7 @@ scalars. A history is a column of
 
 A step computes every row from the new x', v', a' and the old rows from its own index on, in that order.
 
-Generalised-alpha (Chung and Hulbert 1993; with the auxiliary acceleration p of [AB] in `boom_twin.scene.notation`)
+Generalised-alpha (Chung and Hulbert 1993; with the auxiliary acceleration p of [AB] in `boom_twin.kernels`)
 
     x' = x + h v + h^2 ((1/2 - beta) p + beta p'),   v' = v + h ((1 - gamma) p + gamma p'),
     (1 - am) p' + am p = (1 - af) a' + af a;

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..types import Array
-from .elements.base_hinge import HINGE
 from .elements.beam import BEAM as BEAM_ROW
 from .elements.cylinder import CYLINDER, CYLINDER_PART, OIL
 from .elements.linkage import LINKAGE
@@ -63,6 +62,14 @@ LINK = np.dtype(
         ("middle", float),  # half the length, m
         ("mass", float),  # kg
         ("inertia", float),  # about the middle, kg m^2
+    ]
+)
+
+HINGE = np.dtype(
+    [
+        ("z", np.int64),  # index of phi, the rotation of an elastic base, among the unknowns
+        ("stiffness", float),  # N m/rad
+        ("damping", float),  # N m s/rad
     ]
 )
 
@@ -196,7 +203,7 @@ OF_FORCES = (
 def complex_scratch(work: Work) -> Work:
     """Return `work` with complex arrays for `OF_FORCES` and shared arrays for the rest.
 
-    Used by sweeps with complex weights, see `kernels.transfer.frequency_response`.
+    Used by sweeps with complex weights, see `kernels.transfer.vibration`.
     """
     own = {name: getattr(work, name).astype(complex) for name in OF_FORCES}
     condensed = Condensed(*(each.astype(complex) if each.dtype == float else each for each in work.condensed))

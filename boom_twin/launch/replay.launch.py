@@ -21,9 +21,9 @@ from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
 
 from boom_twin.bag.advice import publishable
 from boom_twin.bag.reader import scan
-from boom_twin.bag.session_sheet import kept
+from boom_twin.bag.session_model import kept
 from boom_twin.config.settings import DEFAULT_FILE, read_parameters
-from boom_twin.system.child_process import python_command
+from boom_twin.system.processes import python_command
 
 FLAG = ("true", "false")
 ARGUMENTS = [

@@ -13,7 +13,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from boom_twin.messages.view_files import RVIZ, view_text
+from boom_twin.messages.urdf import RVIZ, view_text
 
 ARGUMENTS = [
     DeclareLaunchArgument("rviz_config", default_value=str(RVIZ), description="what RViz shows"),

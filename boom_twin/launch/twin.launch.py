@@ -19,10 +19,9 @@ from launch_ros.parameter_descriptions import ParameterValue
 from boom_twin.config.settings import DEFAULT_FILE, read_parameters
 from boom_twin.errors import BoomTwinError
 from boom_twin.messages.mapping import load_mapping
-from boom_twin.messages.urdf import urdf
-from boom_twin.messages.view_files import RVIZ
+from boom_twin.messages.urdf import RVIZ, urdf
 from boom_twin.scene import Scene, load_scene
-from boom_twin.system.child_process import python_command
+from boom_twin.system.processes import python_command
 from boom_twin.system.result_folder import check_lasting
 
 FLAG = ("true", "false")

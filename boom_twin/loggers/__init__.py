@@ -1,1 +1,1 @@
-"""Import of logger files, spreadsheets and data frames as sessions."""
+"""Tables of other programs: files, columns, units and times."""

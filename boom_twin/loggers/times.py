@@ -5,22 +5,26 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, date, datetime, timedelta, tzinfo
+from datetime import date, datetime, timedelta, tzinfo
 from decimal import Decimal
+from fnmatch import fnmatchcase
 from functools import cache
+from pathlib import Path
+from typing import Annotated, Literal
 from zoneinfo import ZoneInfo
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
 
 from ..errors import BagError, UsageError
 from ..messages.sample_decoder import LATEST
 from ..types import SECOND, Array
-from .headers import TIME_UNITS, is_time
+from .csv_layout import TIME_UNITS, is_time, unit_of
 from .log_table import LogRows, LogTable, Times
 
 Stamps = NDArray[np.int64]
-ORDERS = ("dmy", "mdy", "ymd")
+Text = Annotated[str, Field(min_length=1, max_length=500)]
 STEPS = 1e-4, 0.2  # s, usual range of the step between rows, used to infer the unit
 LATE_1904, EXCEL_DAYS = 3.0e9, (3.0e4, 8.0e4)  # least s since 1904 (LabVIEW), range of days since 1899 (spreadsheets)
 SINCE_1904, SINCE_1899 = 2_082_844_800 * SECOND, 25_569 * 86_400 * SECOND  # ns from 1904 and 1899 to 1970
@@ -32,13 +36,29 @@ _CLOCK = r"(?P<h>\d{1,2}):(?P<min>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<part>\d+))?)
 _MOMENT = re.compile(rf"(?:{_DATE})?[T ,;]*(?:{_CLOCK})?\s*(?P<zone>Z|UTC|[+-]\d{{2}}:?\d{{2}})?")
 
 
-@dataclass(frozen=True, slots=True)
-class TimeColumn:
-    """Column of the time, or columns of date and time of day, with unit of numbers and order of dates."""
+class Entry(BaseModel):
+    """Entry of a columns file, for the files whose names match the pattern `file`."""
 
-    names: tuple[str, ...] = ()
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    file: Text = "*"
+
+    def is_of(self, table: LogTable) -> bool:
+        """Return True if the table's file name matches `file`."""
+        return fnmatchcase(Path(table.source).name, self.file)
+
+
+class TimeEntry(Entry):
+    """Column with the time, or two with date and time of day; with unit of numbers, and order of dates."""
+
+    column: Text | list[Text]
     unit: str = ""
-    order: str = ""
+    order: Literal["", "dmy", "mdy", "ymd"] = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return (self.column,) if isinstance(self.column, str) else tuple(self.column)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +84,9 @@ def zone_of(name: str) -> tzinfo:
         ) from None
 
 
-def time_places(table: LogTable, given: TimeColumn) -> list[int]:
+def time_places(table: LogTable, given: TimeEntry | None) -> list[int]:
     """Return the indices of the time columns, given or recognised by name, empty if none."""
-    if given.names:
+    if given is not None:
         places = [
             next((i for i, names in enumerate(zip(table.headers, table.names, strict=True)) if name in names), -1)
             for name in given.names
@@ -81,13 +101,16 @@ def time_places(table: LogTable, given: TimeColumn) -> list[int]:
     numbers = [place for place in named if not moments[place]]
     pairs = [[dates[0], clocks[0]]] if len(dates) == len(clocks) == 1 else []
     choices = [*([place] for place in both), *pairs, *([place] for place in numbers), *([place] for place in clocks)]
-    rising = [
-        places for places in choices if _is_rising([" ".join(cells) for cells in zip(*map(table.first, places), strict=False)])
-    ]
-    return (rising or choices or [[]])[0]
+    for places in choices:
+        cells = [*zip(*map(table.first, places), strict=False)]
+        if len({*cells}) > 0.9 * len(cells):
+            return places
+    return (choices or [[]])[0]
 
 
-def read_times(table: LogTable, rows: LogRows, places: Sequence[int], given: TimeColumn, zone: tzinfo | None) -> TableTimes:
+def read_times(
+    table: LogTable, rows: LogRows, places: Sequence[int], given: TimeEntry | None, zone: tzinfo | None
+) -> TableTimes:
     """Return the stamps of a table. Raise BagError for a cell that is no time and for an unknown unit."""
     header = " + ".join(table.headers[place] for place in places)
     cells = rows.times[places[0]]
@@ -99,18 +122,15 @@ def read_times(table: LogTable, rows: LogRows, places: Sequence[int], given: Tim
     elif isinstance(cells, list):
         texts = cells
     if texts and _kinds(next(filter(None, texts), "")):
-        return _moments(table, rows, texts, header, given.order, zone)
-    return _numbers(table, rows, texts or cells, header, given.unit or table.units[places[0]], zone)
+        return _moments(table, rows, texts, header, given.order if given else "", zone)
+    unit = (unit_of(given.unit) if given else "") or table.units[places[0]]
+    return _numbers(table, rows, texts or cells, header, unit, zone)
 
 
 def _kinds(text: str) -> set[str]:
     """Return which of ``date`` and ``clock`` a text has, empty for a number."""
     found = _MOMENT.fullmatch(text.strip())
     return {kind for kind, part in (("date", "a"), ("clock", "h")) if found and found[part] is not None}
-
-
-def _is_rising(cells: list[str]) -> bool:
-    return len({*cells}) > 0.9 * len(cells)
 
 
 def _numbers(table: LogTable, rows: LogRows, cells: Times, header: str, unit: str, zone: tzinfo | None) -> TableTimes:
@@ -270,6 +290,6 @@ def _to_utc(naive: Stamps, zone: tzinfo | None) -> Stamps:
 
 
 def _zone_offset(quarter: int, zone: tzinfo, fold: int) -> int:
-    moment = datetime(1970, 1, 1) + timedelta(seconds=quarter * QUARTER // SECOND)
-    local = moment.replace(tzinfo=zone, fold=fold)
-    return round((local.replace(tzinfo=UTC) - local.astimezone(UTC)).total_seconds()) * SECOND
+    local = datetime(1970, 1, 1) + timedelta(seconds=quarter * QUARTER // SECOND)
+    offset = local.replace(tzinfo=zone, fold=fold).utcoffset() or timedelta()
+    return round(offset.total_seconds()) * SECOND

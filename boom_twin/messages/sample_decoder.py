@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..types import LIMIT, SECOND, SENSORS, Array, Sample, Stream
-from .cdr_decoder import Axes, Vector
-from .message_block import Integers
+from .cdr_decoder import Axes, Integers, Vector
 from .sample_assembler import Reading, SampleAssembler
 from .topic_table import Topics, factor, load_topics
 

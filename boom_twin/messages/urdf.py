@@ -1,16 +1,19 @@
-"""A URDF of a scene: undeformed sections, links and cylinders as a tree, for robot_state_publisher, RViz and Foxglove."""
+"""URDF of a scene for robot_state_publisher, RViz and Foxglove, and the views of these programs for a boom in a namespace."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from ..kernels.elements.linkage import LINK_L
 from ..scene.kinematics import CYLINDER, LEFT, RIGHT, linkage
 from ..scene.schema import Cylinder, Scene
-from .topic_table import FRAME, TIP_JOINTS
+from .topic_table import FRAME, TIP_JOINTS, load_topics
 
 NAME = "boom"
 TIP, TIP_RIGID, TIP_ALONG, TIP_ACROSS, IMU = "tip", "tip_rigid", "tip_along", "tip_across", "imu_link"
@@ -190,3 +193,33 @@ def _xyz(x: float, y: float) -> str:
 def _number(value: float) -> str:
     """Return a number as text with ten digits; -0 becomes 0."""
     return f"{value + 0.0:.10g}"
+
+
+FOLDER = Path(str(files("boom_twin") / "msg_config"))
+RVIZ, FOXGLOVE, PLOTJUGGLER = (FOLDER / name for name in ("boom_twin.rviz", "foxglove.json", "plotjuggler.xml"))
+VIEWS = (RVIZ, FOXGLOVE, PLOTJUGGLER)
+DESCRIPTION = "/robot_description"  # topic of robot_state_publisher
+TF_PREFIX = "TF Prefix:"  # key of the frame prefix in RViz's display of a robot model
+
+
+def view_text(text: str, namespace: str = "", frame_prefix: str = "") -> str:
+    """Return the text of a view with the namespace and the frame prefix of a boom.
+
+    Parameters
+    ----------
+    text : str
+        Text of one of `VIEWS`, or of a similar file.
+    namespace : str
+        ROS namespace of the twin. Quoted absolute names are put into it; relative ones, as RViz's, follow its own namespace.
+    frame_prefix : str
+        As the parameter of twin and robot_state_publisher: ``front/``.
+    """
+    usual, there = load_topics(), load_topics().in_namespace(namespace)
+    space = namespace.strip("/")
+    names = {topic.absolute: there.inputs[key].absolute for key, topic in usual.inputs.items()}
+    names |= {topic.absolute: there.outputs[key].absolute for key, topic in usual.outputs.items()}
+    names[DESCRIPTION] = f"/{space}{DESCRIPTION}" if space else DESCRIPTION
+    longest_first = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
+    text = re.sub(rf'(?<=[";])({longest_first})(?=[/.";\[])', lambda found: names[found[0]], text)
+    text = re.sub(rf"(?<![\w/]){FRAME}\b", f"{frame_prefix}{FRAME}", text)
+    return re.sub(rf'{TF_PREFIX} ""', f'{TF_PREFIX} "{frame_prefix}"', text)

@@ -13,19 +13,17 @@ from typing import Any, Self
 
 from ..errors import BoomTwinError
 from ..messages.topic_table import Topics, load_topics
-from ..twin.driver import Step
-from ..twin.readings import merged
+from ..twin.sample_check import merged
 from ..twin.twin import Twin
 from ..types import Report, Sample
 from . import PORT
 from .access_control import AccessControl
-from .actions import ViewerActions
 from .data.bag_feed import TwinView
 from .data.feed import Feed
-from .data.received_messages import text
-from .data.status import Severity
+from .data.status import Severity, text
 from .data.store import Store
 from .server import Server, serving
+from .viewer import ACTS, ViewerActions
 
 CAPACITY = 150_000  # rows kept of every table: twelve minutes at 200 Hz
 MOST_WAITING = 20_000  # largest number of waiting samples; beyond it the oldest are dropped
@@ -38,16 +36,16 @@ class SourceFeed(Feed):
     def __init__(self, twin: Twin, topics: Topics) -> None:
         super().__init__("live", Store(CAPACITY), topics, twin.scene)
         self._view = TwinView(self, topics, twin)
-        self._waiting: deque[Step] = deque(maxlen=MOST_WAITING)
+        self._waiting: deque[tuple[Sample, Report]] = deque(maxlen=MOST_WAITING)
 
-    def put(self, step: Step) -> None:
+    def put(self, sample: Sample, report: Report) -> None:
         """Queue a sample and its report for the next poll."""
-        self._waiting.append(step)
+        self._waiting.append((sample, report))
 
     def poll(self) -> None:
         """Show the waiting samples."""
         for _ in range(min(len(self._waiting), MOST_AT_ONCE)):
-            self._view.took(self._waiting.popleft())
+            self._view.took(*self._waiting.popleft())
 
     def now(self) -> float:
         """Return the time (s) of a monotonic clock."""
@@ -56,10 +54,6 @@ class SourceFeed(Feed):
     def publish(self, words: str) -> None:
         """Show an event at the newest sample."""
         self.store.alarms.add("event", Severity.OK, text(words), self.store.newest, self.store.newest)
-
-    def release_alarms(self) -> str:
-        """Return a refusal: there is no node."""
-        return "there is no node to let go of it"
 
 
 class LivePage:
@@ -89,12 +83,10 @@ class LivePage:
         The port is taken.
     """
 
-    def __init__(
-        self, twin: Twin, host: str = "127.0.0.1", port: int | None = None, allow: Collection[str] = ("mark", "acknowledge")
-    ) -> None:
+    def __init__(self, twin: Twin, host: str = "127.0.0.1", port: int | None = None, allow: Collection[str] = ACTS) -> None:
         self._twin, self._host, self._port, self.address = twin, host, port, ""
         self._feed = SourceFeed(twin, load_topics().reading(twin.reads))
-        self._actions = ViewerActions(self._feed, frozenset(allow))
+        self._actions = ViewerActions(self._feed, allow)
         self._begun: Future[str] = Future()
         self._thread = Thread(target=self._run, name="live page", daemon=True)
 
@@ -103,7 +95,7 @@ class LivePage:
         reports = []
         for each in self._twin.samples(sample, stamp_ns) if isinstance(sample, Mapping) else [sample]:
             reports.append(self._twin.update(each))
-            self._feed.put(Step(each, reports[-1], 0.0))
+            self._feed.put(each, reports[-1])
         return reports[0] if len(reports) == 1 else merged(reports)
 
     def __enter__(self) -> Self:

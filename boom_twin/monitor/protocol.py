@@ -5,19 +5,16 @@ A binary message is a sequence of blocks. A block has a multiple of 8 bytes. Num
 ======  =====================  ========================================================================================
 offset  type                   meaning
 ======  =====================  ========================================================================================
-0       uint8                  kind: 1 = rows of a table, 2 = spectrum, 3 = columns of the spectrogram, 4 = response
-1       uint8                  kinds 1, 2: index of the table in the newest ``layout`` message; kind 3: index of the
-                               signal in `boom_twin.monitor.data.analyst.SIGNALS`; kind 4: 0
+0       uint8                  kind: 1 = rows of a table, 2 = spectrum
+1       uint8                  index of the table in the newest ``layout`` message
 2       uint16                 columns, c
 4       uint32                 rows, k
-8       float64 x k            kinds 1, 3: seconds since the session's epoch; kinds 2, 4: frequencies, Hz
+8       float64 x k            kind 1: seconds since the session's epoch; kind 2: frequencies, Hz
 8 + 8k  float32 x k x c        values column by column, then zeros up to a multiple of 8 bytes
 ======  =====================  ========================================================================================
 
-A spectrum has two columns: the directions named by the message ``lines`` before it. A spectrogram has one column for each of
-`boom_twin.monitor.data.spectrum.FREQUENCIES`. A response has one for each load named by the message ``loads`` before it.
-Text messages are JSON with a key ``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``loads``,
-``answer``.
+A spectrum has two columns: the directions named by the message ``lines`` before it. Text messages are JSON with a key ``kind``:
+``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``rates``, ``answer``.
 """
 
 from __future__ import annotations
@@ -29,14 +26,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..system.json_text import json_text
+from ..system.result_text import json_text
 from ..types import SENSORS
-from .data.received_messages import DroppedMessages
 from .data.status import HEALTH, ListedAlarm, Severity, StatusLamp, overall, worst
-from .data.store import Store
+from .data.store import DroppedMessages, Store
 from .data.topic_rows import RESIDUALS
 
-ROWS, SPECTRUM, SPECTROGRAM, RESPONSE = 1, 2, 3, 4
+ROWS, SPECTRUM = 1, 2
 HEAD = struct.Struct("<BBHI")
 
 

@@ -11,24 +11,19 @@ from pathlib import Path
 
 from aiohttp import web
 
-from ..errors import BoomTwinError, UsageError
+from ..errors import UsageError
 from ..texts import FILE as TEXTS
 from . import PORT
-from .access_control import POLICY, AccessControl, in_address
-from .actions import ViewerActions
-from .alarm_watch import AlarmWatch
-from .connections import Connection, Connections
+from .access_control import POLICY, AccessControl, Connection, Connections, in_address
 from .data.analyst import Analyst
-from .data.feed import Feed, SessionList
-from .metrics import Metrics
-from .viewer import Viewer
-from .webhook import Webhook
+from .data.feed import Feed
+from .fleet import AlarmWatch, Metrics, Webhook
+from .viewer import Viewer, ViewerActions
 
 PAGE = Path(__file__).parent / "page"
 MAX_VIEWERS = 16
 MAX_REQUEST_BYTES = 4096  # largest request of a page, bytes
 POLL_PERIOD = 1.0 / 60.0  # seconds between two polls of the feed
-PEAK_PERIOD = 10.0  # seconds between two spectra of a live session while no page is open
 ALARM_PERIOD = 1.0  # seconds between two looks for changes of alarms
 HEARTBEAT = 60.0  # seconds without an answer after which the connection of a viewer is closed
 
@@ -36,20 +31,12 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Server of the live page for one feed: of several `sessions`, the open one. `webhook` posts changes of alarms."""
+    """Server of the live page for one feed. `webhook` posts changes of alarms."""
 
-    def __init__(
-        self,
-        feed: Feed,
-        actions: ViewerActions,
-        access: AccessControl,
-        sessions: SessionList | None = None,
-        webhook: Webhook | None = None,
-    ) -> None:
-        self._actions, self._access = actions, access
-        self._sessions, self._webhook = sessions, webhook
-        self._show(feed)
-        self._opening: asyncio.Task[None] | None = None
+    def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl, webhook: Webhook | None = None) -> None:
+        self._feed, self._actions, self._access, self._webhook = feed, actions, access, webhook
+        self._watch = AlarmWatch(feed)
+        self._metrics = Metrics(feed, self._watch)
         self._viewers: set[web.WebSocketResponse] = set()
 
     def application(self) -> web.Application:
@@ -95,7 +82,7 @@ class Server:
             await socket.prepare(request)
             if isinstance(request.protocol, Connection):
                 request.protocol.become_viewer()
-            await Viewer(socket, self._feed, self._actions, self._analyst, self._sessions, self._choose).serve()
+            await Viewer(socket, self._feed, self._actions, self._analyst).serve()
         finally:
             self._viewers.discard(socket)
         return socket
@@ -105,7 +92,7 @@ class Server:
         async with AsyncExitStack() as stack:
             if self._webhook is not None:
                 await stack.enter_async_context(self._webhook.posting())
-            tasks = [asyncio.create_task(each()) for each in (self._poll, self._track_peaks, self._follow_alarms)]
+            tasks = [asyncio.create_task(each()) for each in (self._poll, self._follow_alarms)]
             tasks[0].add_done_callback(_stop_on_fault)
             yield
             for task in tasks:
@@ -125,40 +112,6 @@ class Server:
                 if self._webhook is not None:
                     self._webhook.put(change)
             await asyncio.sleep(ALARM_PERIOD)
-
-    def _show(self, feed: Feed) -> None:
-        self._feed, self._watch = feed, AlarmWatch(feed)
-        self._metrics = Metrics(feed, self._watch)
-
-    async def _track_peaks(self) -> None:
-        """Follow the peaks of a live session from its beginning, also while no page is open."""
-        while self._feed.end is None:
-            await self._analyst.spectrum_at(self._feed.store.newest)
-            await asyncio.sleep(PEAK_PERIOD)
-
-    def _choose(self, index: int) -> str:
-        """Start opening another session for all viewers; return a sentence for them."""
-        assert self._sessions is not None
-        if self._opening is not None and not self._opening.done():
-            return "a session is being opened already"
-        self._opening = asyncio.create_task(self._open(self._sessions, index))
-        return f"opening {self._sessions.names[index]} .."
-
-    async def _open(self, sessions: SessionList, index: int) -> None:
-        """Show another session: close the viewers' sockets, so that their pages connect again.
-
-        A thread opens it. The previous session is read in this event loop, so it is closed here, too.
-        """
-        try:
-            feed = await asyncio.to_thread(sessions.open, index)
-        except BoomTwinError as error:
-            self._feed.trouble = str(error)
-            return
-        sessions.show(index, feed)
-        self._show(feed)
-        self._actions, self._analyst = self._actions.of(self._feed), Analyst(self._feed)
-        for socket in set(self._viewers):
-            await socket.close()
 
     async def _close_viewers(self, application: web.Application) -> None:
         for socket in set(self._viewers):

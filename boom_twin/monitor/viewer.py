@@ -1,4 +1,4 @@
-"""Viewer of the live page: messages sent to it, and its requests.
+"""Viewer of the live page: messages sent to it, its requests, and what it may do.
 
 No message is queued. The rows to send follow from the numbers of the rows already sent. Lamps and alarms are sent in their
 present state. A slow page loses rows, but no state of the lamps.
@@ -9,15 +9,17 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Collection
+from dataclasses import asdict
 from math import inf, isfinite
 from typing import Any
+from unicodedata import category
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from .actions import ViewerActions
-from .data.analyst import Analyst, TipResponses, response_messages
-from .data.feed import Feed, Playback, SessionList
+from .data.analyst import Analyst
+from .data.feed import Feed, Playback
+from .data.status import MAX_ALARMS
 from .data.store import Table
 from .protocol import ROWS, alarms, dump, layout, pack, state
 
@@ -31,34 +33,57 @@ NEWEST_ROW_ONLY = "shape"  # table of which only the newest row is sent
 MAX_REQUESTS = 40  # largest number of requests of a page in a second
 
 
+NOTE_LENGTH = 500  # largest number of characters of a note
+NO_TEXT = ("Cc", "Cs")  # unicode categories that cannot be published: control characters and surrogates
+ACTS = ("mark", "acknowledge")
+
+
+class ViewerActions:
+    """Actions of viewers: those of `ACTS` that are permitted at start. A recording takes no marks."""
+
+    def __init__(self, feed: Feed, permitted: Collection[str]) -> None:
+        self._feed = feed
+        self.permitted = frozenset(permitted) - (frozenset() if feed.end is None else {"mark"})
+        self._acts = {"mark": self._mark, "acknowledge": self._acknowledge}
+
+    def act(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Carry out a request and return the answer; raise ValueError if it is unknown."""
+        name = request.get("do")
+        if name not in self._acts:
+            raise ValueError("unknown request")
+        if name not in self.permitted:
+            return {"kind": "answer", "do": name, "done": False, "words": "not permitted when the monitor was started"}
+        return {"kind": "answer", "do": name, "done": True, "words": self._acts[name](request)}
+
+    def _mark(self, request: dict[str, Any]) -> str:
+        note = request.get("note")
+        if not isinstance(note, str) or len(note) > NOTE_LENGTH or any(category(sign) in NO_TEXT for sign in note):
+            raise ValueError(f"a note is a text of at most {NOTE_LENGTH} characters, none of them a control character")
+        self._feed.publish(f"mark: {note}")
+        return f"marked: {note}"
+
+    def _acknowledge(self, request: dict[str, Any]) -> str:
+        known = (self._feed.store.alarms.acknowledge(int(number)) for number in request["numbers"][:MAX_ALARMS])
+        found = [alarm for alarm in known if alarm is not None]
+        for alarm in found if self._feed.end is None else []:
+            self._feed.publish(f"acknowledged: {alarm.name}: {alarm.reason}")
+        return f"acknowledged: {', '.join(alarm.name for alarm in found)}" if found else "that alarm is not kept any more"
+
+
 class Viewer:
-    """Viewer of one prepared WebSocket.
+    """Viewer of one prepared WebSocket."""
 
-    `choose` opens one of the `sessions` by its index and returns a sentence for the viewer.
-    """
-
-    def __init__(
-        self,
-        socket: web.WebSocketResponse,
-        feed: Feed,
-        actions: ViewerActions,
-        analyst: Analyst,
-        sessions: SessionList | None,
-        choose: Callable[[int], str],
-    ) -> None:
+    def __init__(self, socket: web.WebSocketResponse, feed: Feed, actions: ViewerActions, analyst: Analyst) -> None:
         self._socket, self._feed, self._actions, self._analyst = socket, feed, actions, analyst
-        self._sessions, self._choose = sessions, choose
         self._playback = None if feed.end is None else Playback(feed)
         self._sent: dict[str, int] = {}
         self._generation = -1
         self._tables = 0
         self._alarms = ""
-        self._spectrogram_until = -inf
-        self._response: TipResponses | None = None
 
     async def serve(self) -> None:
         """Send and receive until one task ends."""
-        tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectra, self._send_responses, self._receive)]
+        tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectra, self._send_rates, self._receive)]
         _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in others:
             task.cancel()
@@ -75,8 +100,6 @@ class Viewer:
                 "end": feed.end,
                 "permitted": sorted(self._actions.permitted),
                 "history": HISTORY,
-                "sessions": [] if self._sessions is None else self._sessions.names,
-                "session": 0 if self._sessions is None else self._sessions.index,
             }
         )
         last = time.monotonic()
@@ -98,7 +121,7 @@ class Viewer:
     async def _restart_if_cleared(self) -> None:
         store = self._feed.store
         if store.generation != self._generation:
-            self._generation, self._tables, self._sent, self._spectrogram_until = store.generation, 0, {}, -inf
+            self._generation, self._tables, self._sent = store.generation, 0, {}
             await self._send_text({"kind": "reset"})
         if len(store.tables) != self._tables:
             self._tables = len(store.tables)
@@ -111,7 +134,7 @@ class Viewer:
         if play is not None:
             message |= {"position": play.position, "speed": play.speed, "is_held": play.is_held}
             message |= {"end": feed.end, "read": feed.store.newest}
-        message |= {"trouble": feed.trouble, "phase": feed.phase, "is_recording": self._actions.is_recording}
+        message |= {"trouble": feed.trouble, "phase": feed.phase}
         await self._send_text(message)
         told = dump(alarms(feed.store.alarms.all))
         if told != self._alarms:
@@ -154,25 +177,16 @@ class Viewer:
                 lines, block = found
                 await self._send_text(lines)
                 await self._socket.send_bytes(block)
-            await self._send_spectrogram(position)
             await asyncio.sleep(SPECTRUM_PERIOD)
 
-    async def _send_spectrogram(self, position: float) -> None:
-        generation = self._generation
-        found = await self._analyst.spectrogram_between(max(self._spectrogram_until, position - HISTORY), position)
-        if found is not None and generation == self._generation == self._feed.store.generation:
-            self._spectrogram_until, block = found
-            await self._socket.send_bytes(block)
-
-    async def _send_responses(self) -> None:
-        """Send the response in the posture shown if the page does not have it."""
+    async def _send_rates(self) -> None:
+        """Send the pump rates to avoid in the posture shown if the page does not have them."""
+        sent = None
         while not self._socket.closed:
-            found = await self._analyst.response_at(self._position)
-            if found is not self._response:
-                self._response, (text, block) = found, response_messages(found)
-                await self._send_text(text)
-                if block:
-                    await self._socket.send_bytes(block)
+            found = await self._analyst.rates_at(self._position)
+            if found is not sent:
+                sent = found
+                await self._send_text({"kind": "rates", **asdict(found)})
             await asyncio.sleep(SPECTRUM_PERIOD)
 
     @property
@@ -203,17 +217,10 @@ class Viewer:
     def _do(self, request: Any) -> dict[str, Any] | None:
         if not isinstance(request, dict):
             raise ValueError("not a request")
-        if request.get("do") == "session":
-            return self._choose_session(request["value"])
         if request.get("do") in ("seek", "speed", "hold"):
             self._control_playback(request["do"], float(request["value"]))
             return None
         return self._actions.act(request)
-
-    def _choose_session(self, index: Any) -> dict[str, Any]:
-        if self._sessions is None or type(index) is not int or not 0 <= index < len(self._sessions.names):
-            raise ValueError("no such session")
-        return {"kind": "answer", "do": "session", "done": True, "words": self._choose(index)}
 
     def _control_playback(self, what: str, value: float) -> None:
         if (play := self._playback) is None or not isfinite(value):

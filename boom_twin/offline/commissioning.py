@@ -12,31 +12,25 @@ from typing import Any
 import numpy as np
 
 from ..bag.reader import Session, read, scan
-from ..bag.session_model import SessionScene, mapping_of, scene_of, settings_of, strokes_of
-from ..bag.session_sheet import kept
-from ..bag.time_window import WHOLE, TimeWindow
+from ..bag.session_file import WHOLE, TimeWindow
+from ..bag.session_model import SessionScene, kept, mapping_of, scene_of, settings_of, strokes_of
 from ..config.yaml_text import plain, read_plain
 from ..errors import BagError, UsageError
 from ..messages.mapping import mapping_from
 from ..messages.topic_table import Sensor, Topics, usual
 from ..scene.edit import loaded
 from ..scene.load import SceneSource
-from ..twin.blocks import CODES, ReportBlock, SampleBlock
-from ..twin.driver import drive_blocks
+from ..twin.blocks import CODES, SampleBlock
 from ..twin.twin import Twin
-from ..types import NO_LAG, SENSORS, Array, Change, Place, Stream, StrokeReading
-from ..wiring.check import Checked, Verdict, check
-from ..wiring.expected import RestModel
-from ..wiring.lag import Lag, lag_of
-from ..wiring.readings import Channel, Series, Window, is_checked
-from ..wiring.words import STROKES_ALONE, finding
+from ..types import NO_LAG, SENSORS, Array, Place, Stream, StrokeReading
+from ..wiring.check import STROKES_ALONE, Checked, Verdict, check, finding
+from ..wiring.readings import Channel, Lag, RestModel, Series, Window, is_checked, lag_of
 from .session_samples import SessionSamples
 
 LOOK = 60.0  # s of a session that `wiring_of` reads
 LATE = 0.01  # s, smallest lag that is proposed as `delay`
 MOST_LAG = 0.08  # s, largest lag that the filter is left to estimate
-SIGMAS = 4.0  # standard deviations required to accept a lag, or to tell drives from lengths
-ZERO = math.radians(0.15)  # standard deviation of an encoder's zero
+SIGMAS = 4.0  # standard deviations required to accept a lag
 AXES = "x", "y", "z"
 
 UNTIMED = {Stream.STROKES, *NO_LAG}
@@ -51,9 +45,6 @@ class Commissioning:
     # lag of each stream against the strokes; empty if it was not asked for, or the strokes are not known
     lags: Mapping[Stream, Lag]
     absent: list[str]  # channels that are in no message, proposed as ``none``
-    # declared_reads, reads: what stroke transducers read as declared, and as told by the encoders; None if it cannot be told
-    declared_reads: StrokeReading
-    reads: StrokeReading | None
 
     @property
     def wrong(self) -> list[Verdict]:
@@ -68,8 +59,7 @@ class Commissioning:
     @property
     def has_proposal(self) -> bool:
         """Return True if a mapping is proposed."""
-        is_other = self.reads is not None and self.reads is not self.declared_reads
-        return bool(self.late) or is_other or bool(self.absent) or any(verdict.is_sure for verdict in self.wrong)
+        return bool(self.late) or bool(self.absent) or any(verdict.is_sure for verdict in self.wrong)
 
 
 def wiring_of(bag: Path, scene: SceneSource | SessionScene, mapping: str | Path | None, window: TimeWindow) -> str:
@@ -137,8 +127,7 @@ def commission(
         without = f": {', '.join(silent)} never had a value" if silent else ""
         lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes{without}"
         raise BagError(f"{lacking}. Give the boom's scene by --scene.")
-    told = told_reading(found, reads)
-    _mend(document, found, None if told is reads else told)
+    _mend(document, found)
     absent = [each.channel for each in found.verdicts if found.lacks(each) and each.channel not in mapped.topics.absent]
     for channel in absent:
         document.setdefault("sensors", {})[channel] = "none"
@@ -146,14 +135,14 @@ def commission(
     if with_lags and all(v.is_sure or not v.is_wrong for v in found.verdicts if v.stream is Stream.STROKES):
         topics = mapping_from(document, mapped.source, joints).of_scene(own.scene.joints)
         mounts = topics.mounts(joints)
-        sensing = topics.noise_of(settings), mounts, False, told or reads, topics.absent
+        sensing = topics.noise_of(settings), mounts, False, reads, topics.absent
         twin = Twin(own.scene, *sensing, places=topics.places, lagging=topics.lagging)
         lags = _lags(twin, session, topics, window, found)
         near = [stream for stream, lag in lags.items() if abs(lag.lag) < MOST_LAG and lag.sigma < math.inf]
         for _ in range(2):  # the second pass estimates lags of late streams only; the others give the time
             twin = Twin(own.scene, *sensing, places=topics.places, lagging=dict.fromkeys([*topics.lagging, *near]))
-            for _step in drive_blocks(twin, _samples(session, topics, window, joints)):
-                pass
+            for block in _samples(session, topics, window, joints):
+                twin.take(block)
             lags |= {stream: Lag(clock.lag, clock.lag_sigma) for stream, clock in twin.clocks.items() if stream in lags}
             near = [stream for stream in near if is_late(lags[stream])]
         for stream, lag in lags.items():
@@ -161,7 +150,7 @@ def commission(
                 delay = round(topics.inputs[stream].delay + lag.lag, 3)
                 entry = document.setdefault("inputs", {}).setdefault(stream.value, {})
                 entry["delay"] = "auto" if abs(delay) < MOST_LAG else delay
-    return Commissioning(found, document, lags, absent, reads, told)
+    return Commissioning(found, document, lags, absent)
 
 
 def _document(session: Path, mapping: Path | None) -> dict[str, Any]:
@@ -172,7 +161,7 @@ def _document(session: Path, mapping: Path | None) -> dict[str, Any]:
     return {} if own is None else dict(plain(own.text) or {})
 
 
-def _mend(document: dict[str, Any], found: Checked, reads: StrokeReading | None) -> None:
+def _mend(document: dict[str, Any], found: Checked) -> None:
     """Write everything that a check is sure of into the content of a mapping."""
     for verdict in found.verdicts:
         if verdict.is_sure and verdict.best is not None:
@@ -184,8 +173,6 @@ def _mend(document: dict[str, Any], found: Checked, reads: StrokeReading | None)
                 entry = document.setdefault("inputs", {}).setdefault(verdict.stream.value, {})
                 turned = round(math.remainder(verdict.best.turned, math.tau), 4)
                 entry["place"] = {**(entry.get("place") or {}), "turned": turned}
-    if reads is not None:
-        document.setdefault("inputs", {}).setdefault(Stream.STROKES.value, {})["reads"] = reads.value
 
 
 def _sensor(channel: str, way: Channel) -> dict[str, Any]:
@@ -251,20 +238,17 @@ def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, foun
     """
     raw: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
     left: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
-    for step in drive_blocks(twin, _samples(session, topics, window, len(twin.mounts))):
-        if step is not None:
-            _collect(raw, step[0])
-            for each in step[1]:
-                if isinstance(each, ReportBlock):
-                    _collect(left, each.residuals)
+    for block in _samples(session, topics, window, len(twin.mounts)):
+        _collect(raw, block)
+        _collect(left, twin.take(block).residuals)
     known = {v.stream for v in found.verdicts} - {v.stream for v in found.verdicts if v.is_wrong and not v.is_sure}
     return {each: _lag(raw[each], left[each]) for each in Stream if each in known - UNTIMED and left[each]}
 
 
-def _samples(session: Session, topics: Topics, window: TimeWindow, joints: int) -> Iterator[Any]:
+def _samples(session: Session, topics: Topics, window: TimeWindow, joints: int) -> Iterator[SampleBlock]:
     """Yield the samples of a session, without changes that a node made."""
     wanted = [name for name in topics.heard if (topic := session.find(name)) is not None and topic.count]
-    return (item for item in SessionSamples(session, topics, wanted, joints, window) if not isinstance(item, Change))
+    return (item for item in SessionSamples(session, topics, wanted, joints, window) if isinstance(item, SampleBlock))
 
 
 def _collect(columns: dict[Stream, list[tuple[Array, Array]]], block: SampleBlock | Any) -> None:
@@ -290,38 +274,3 @@ def _lag(raw: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, Array]]
     columns = np.flatnonzero(is_read[:width])
     read, off = read[whole][:, columns], off[whole][:, columns]
     return lag_of(common[whole], read, read - off)
-
-
-def told_reading(found: Checked, reads: StrokeReading) -> StrokeReading | None:
-    """Return what stroke transducers read by the encoders; None if it cannot be told."""
-    table, own = found.tables.get(Stream.ANGLES), [v for v in found.verdicts if v.stream is Stream.ANGLES]
-    if table is None or any(v.is_wrong and not v.is_sure for v in found.verdicts if v.stream is not Stream.IMU):
-        return None
-    units, turns, off = SENSORS[Stream.ANGLES].units, list[Array](), list[Array]()
-    for j, verdict in enumerate(own):
-        way = verdict.best
-        if way is None or way.absolute is not None or way.name not in table.names:
-            continue
-        angle = way.sign * way.scale * units[way.unit] * (table.values[:, table.names.index(way.name)] - way.zero)
-        rest = angle - found.expected.angles[None][:, j]
-        off.append(np.remainder(rest + math.pi, math.tau) - math.pi)
-        turns.append(found.expected.compression[:, j])
-    return _reading_by(np.array(turns), np.array(off), reads)
-
-
-def _reading_by(turns: Array, off: Array, reads: StrokeReading) -> StrokeReading | None:
-    """Return what transducers read by residuals of encoders (joints, blocks), rad; None if that is not sure.
-
-    They are `turns` if drives are read as lengths, and minus that if lengths are read as drives.
-    """
-    if not len(off):
-        return None
-    right, by = np.nanmean(off, axis=1), np.nanmean(turns, axis=1)
-    weight = float((by**2).sum())
-    share, sigma = float((right * by).sum()) / max(weight, 1e-300), ZERO / max(weight, 1e-300) ** 0.5
-    rest = float(np.abs(right - share * by).max())
-    other = StrokeReading.DRIVE if reads is StrokeReading.LENGTH else StrokeReading.LENGTH
-    shares = {reads: 0.0, other: 1.0 if reads is StrokeReading.LENGTH else -1.0}
-    near = min(shares, key=lambda each: abs(share - shares[each]))
-    is_sure = SIGMAS * sigma < 0.5 * abs(shares[other]) and abs(share - shares[near]) < SIGMAS * sigma and rest < 3.0 * ZERO
-    return near if is_sure else None

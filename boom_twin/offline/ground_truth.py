@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+from collections import defaultdict
 from dataclasses import dataclass
 from io import BytesIO
 from math import sqrt
@@ -11,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..bag.reader import Session, read
-from ..bag.time_window import WHOLE, TimeWindow
+from ..bag.session_file import WHOLE, TimeWindow
 from ..errors import BagError
 from ..messages.sample_decoder import stamp_of
 from ..messages.topic_table import Topics
@@ -53,26 +54,26 @@ class TipErrors:
     def __init__(self, truth: TipTruth) -> None:
         self._truth = truth
         self._first: int | None = None
-        self._count, self._position, self._acceleration = 0, 0.0, 0.0
-        self._estimates, self._estimated_position, self._estimated_acceleration = 0, 0.0, 0.0
+        self._counts, self._squares = defaultdict[str, int](int), defaultdict[str, float](float)  # by names in ``summary.json``
 
-    def add(self, predictions: PredictionBlock, rows: slice, estimates: EstimateBlock | None = None) -> None:
+    def add(self, predictions: PredictionBlock, rows: slice, estimates: EstimateBlock) -> None:
         """Add some rows of predictions, all by the clock of the first one, and the estimates of the same rows."""
         stamps, truth = predictions.stamps[rows], self._truth
         if not len(stamps):
             return
         self._first = int(stamps[0]) if self._first is None else self._first
         times = (stamps - self._first) * NANO + truth.times[0]
-        self._count += len(stamps)
         position, acceleration = truth.at(times, truth.position), truth.at(times, truth.acceleration)
-        self._position += float(np.sum((predictions.tip_position[rows] - position) ** 2))
-        self._acceleration += float(np.sum((predictions.tip_acceleration[rows] - acceleration) ** 2))
-        if estimates is None:
-            return
         fed = estimates.is_fed[rows]
-        self._estimates += int(fed.sum())
-        self._estimated_position += float(np.sum((estimates.tip[rows, :2] - position)[fed] ** 2))
-        self._estimated_acceleration += float(np.sum((estimates.acceleration[rows, :2] - acceleration)[fed] ** 2))
+        errors = {
+            "tip_error_rms_m": predictions.tip_position[rows] - position,
+            "tip_acceleration_error_rms_m_s2": predictions.tip_acceleration[rows] - acceleration,
+            "tip_estimate_error_rms_m": (estimates.tip[rows, :2] - position)[fed],
+            "tip_estimate_acceleration_error_rms_m_s2": (estimates.acceleration[rows, :2] - acceleration)[fed],
+        }
+        for name, error in errors.items():
+            self._counts[name] += len(error)
+            self._squares[name] += float(np.sum(error**2))
 
     @property
     def rms(self) -> dict[str, float]:
@@ -80,14 +81,7 @@ class TipErrors:
 
         Those of estimates are included if there are any.
         """
-        found = {
-            "tip_error_rms_m": sqrt(self._position / self._count),
-            "tip_acceleration_error_rms_m_s2": sqrt(self._acceleration / self._count),
-        }
-        if self._estimates:
-            found["tip_estimate_error_rms_m"] = sqrt(self._estimated_position / self._estimates)
-            found["tip_estimate_acceleration_error_rms_m_s2"] = sqrt(self._estimated_acceleration / self._estimates)
-        return found
+        return {name: sqrt(self._squares[name] / count) for name, count in self._counts.items() if count}
 
 
 def load_truth(folder: Path) -> TipTruth | None:

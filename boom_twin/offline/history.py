@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.cylinder_drives import drives_as_read
+from ..analysis.drive import drives_as_read
 from ..analysis.posture_modes import ModeList
 from ..analysis.undeflected import UndeflectedBoom
 from ..compiler.compile import compile_scene
@@ -18,11 +18,10 @@ from ..compiler.plan import Plan
 from ..deviation.estimate_row import VARIANCES
 from ..deviation.sensor_model import specific_force
 from ..plots import AlarmSpan, EstimateTrace, History, ImuTrace, Truth, replay_pictures
-from ..plots.extreme_rows import ExtremeRows
-from ..plots.health import SLOW
-from ..plots.residuals import running_mean
-from ..plots.session_distributions import SessionDistributionsBuilder
-from ..plots.tip import ENLARGED_SPAN
+from ..plots.history import ExtremeRows
+from ..plots.residuals import SessionDistributionsBuilder, running_mean
+from ..plots.results import SLOW
+from ..plots.session import ENLARGED_SPAN
 from ..scene.kinematics import gravity_in_base
 from ..scene.schema import Scene
 from ..types import NANO, Array, Stream, channels_of

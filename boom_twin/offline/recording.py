@@ -1,19 +1,22 @@
-"""Recording of a replay: predictions, a stretch of the session at a time, and totals of all stretches."""
+"""Recording of a replay: predictions, a stretch of the session at a time; totals of all, and ``summary.json``."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.column_statistics import ColumnStatistics
-from ..deviation.load_spectrum import TipLoadFinder
-from ..health.alarms import Alarms
-from ..twin.blocks import CODES, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined, report_block
-from ..types import HELD, NANO, USUAL_STREAMS, Alarm, Array, Health, Report, Stream, StrokeReading, channels_of
+from ..analysis.sample_series import ColumnStatistics
+from ..deviation.load_spectrum import TipLoad, TipLoadFinder
+from ..health.alarms import Alarms, evidence_with_cause
+from ..system.received_files import sha256_of
+from ..twin.blocks import CODES, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined
+from ..types import HELD, NANO, USUAL_STREAMS, Alarm, Array, Clock, Health, Stream, StrokeReading, channels_of
 from .ground_truth import TipErrors
 
 STRETCH = 2**14  # predictions in a stretch, at least: 82 s at 200 Hz, some 30 MB
@@ -129,12 +132,11 @@ class Recording:
     ) -> None:
         self._joints, self._take, self._errors, self.reads, self._streams = joints, take, errors, reads, streams
         self._parts: list[ReportBlock] = []
-        self._single: list[Report] = []
         self._health: list[Health] = []
         self._samples: list[SampleBlock] = []
         self._alarms = Alarms()
         self._newest: int | None = None
-        self._first = 0
+        self.first = 0  # stamp of the first prediction, ns
         self._count = self._before = 0  # predictions so far, and those in earlier stretches
         self._rows_by_first_clock: int | None = None
         self._whole: Stretch | None = None
@@ -145,24 +147,37 @@ class Recording:
         self.noise: Mapping[str, float] = {}  # see `Health.noise`; the newest
         self.totals = SessionTotals(joints)  # of all stretches that are complete
 
-    def add(self, found: ReportBlock | Report) -> None:
-        """Add reports of samples."""
-        if isinstance(found, Report):
-            self._add_one(found)
-        else:
-            self._close_single()
-            self._parts.append(found)
-            stamps = found.predictions.stamps
-            if len(stamps):
-                self._note_predictions(int(stamps[0]), int(stamps[-1]), len(stamps))
-            for health in found.health.values():
-                self._add_health(health)
+    def add(self, rows: ReportBlock, samples: SampleBlock) -> None:
+        """Add a block of samples and their reports."""
+        self._samples.append(samples)
+        self._parts.append(rows)
+        for row, note in rows.notes.items():
+            is_refused = not note.accepted or not HELD.isdisjoint(note.events)
+            self.refused += is_refused - note.was_held
+            self._note_time(rows.predictions, row, frozenset(note.events))
+        stamps = rows.predictions.stamps
+        if len(stamps):
+            self.first = int(stamps[0]) if self._newest is None else self.first
+            self._newest = int(stamps[-1])
+            self._count += len(stamps)
+        for health in rows.health.values():
+            self.is_judged, self.noise = True, health.noise
+            self._health.append(health)
+            self._alarms.take(health)
         if self._take is not None and self._count - self._before >= STRETCH:
             self._complete()
 
-    def add_samples(self, samples: SampleBlock) -> None:
-        """Keep samples for the stretch."""
-        self._samples.append(samples)
+    def _note_time(self, predictions: PredictionBlock, row: int, events: frozenset[str]) -> None:
+        """Store where stamps stepped: the stamp before, and that of the sample in `row`, if it was followed."""
+        at = int(np.searchsorted(predictions.at, row))
+        if at == len(predictions.at) or predictions.at[at] != row:
+            return
+        before = int(predictions.stamps[at - 1]) if at else self._newest
+        for found, kinds in ((self.gaps, {"gap", "restart"}), (self.clock_sets, {"clock set", "jump back"})):
+            if before is not None and events & kinds:
+                found.append((before, int(predictions.stamps[at])))
+        if self.clock_sets and self._rows_by_first_clock is None:
+            self._rows_by_first_clock = self._count + at
 
     def close(self) -> None:
         """Complete the last stretch; to be called once, after the last `add`."""
@@ -172,49 +187,6 @@ class Recording:
     def is_empty(self) -> bool:
         """Return True if nothing was predicted yet."""
         return self._newest is None
-
-    @property
-    def first(self) -> int:
-        """Stamp of the first prediction, ns."""
-        return self._first
-
-    def _note_predictions(self, first: int, last: int, count: int) -> None:
-        if self._newest is None:
-            self._first = first
-        self._newest = last
-        self._count += count
-
-    def _add_health(self, health: Health) -> None:
-        self.is_judged = True
-        self.noise = health.noise
-        self._health.append(health)
-        self._alarms.take(health)
-
-    def _add_one(self, report: Report) -> None:
-        self.refused -= len(report.earlier)
-        for each in report.earlier:
-            self._add_one(each)
-        if not report.accepted or not HELD.isdisjoint(report.events):
-            self.refused += 1
-        if report.prediction is not None:
-            self._note_time(report)
-            self._note_predictions(report.stamp, report.stamp, 1)
-        if report.health is not None:
-            self._add_health(report.health)
-        self._single.append(report)
-
-    def _note_time(self, report: Report) -> None:
-        """Store where stamps stepped: the stamp before, and the one after."""
-        for found, events in ((self.gaps, ("gap", "restart")), (self.clock_sets, ("clock set", "jump back"))):
-            if self._newest is not None and not set(events).isdisjoint(report.events):
-                found.append((self._newest, report.stamp))
-        if self.clock_sets and self._rows_by_first_clock is None:
-            self._rows_by_first_clock = self._count
-
-    def _close_single(self) -> None:
-        if self._single:
-            self._parts.append(report_block(self._single, self._joints))
-            self._single = []
 
     def _complete(self) -> None:
         """Make a stretch of what came since the last one, add it to the totals, and give it away or keep it."""
@@ -232,9 +204,8 @@ class Recording:
             self._take(stretch)
 
     def _stretch(self) -> Stretch | None:
-        self._close_single()
         parts = [part for part in self._parts if len(part.predictions.stamps) or len(part.residuals.stamps)]
-        own = self._health, self._first, self._samples, self.reads, self._streams
+        own = self._health, self.first, self._samples, self.reads, self._streams
         return Stretch(self._joints, joined(parts), *own) if parts else None
 
     @property
@@ -251,7 +222,7 @@ class Recording:
 
         Steps of a clock that was set are not part of it.
         """
-        span = (self._newest or 0) - self._first
+        span = (self._newest or 0) - self.first
         return (span - sum(after - before for before, after in self.clock_sets)) * NANO
 
     def _by_first_clock(self, before: int) -> slice:
@@ -264,3 +235,85 @@ class Recording:
     def alarms(self) -> list[Alarm]:
         """Return all alarms, each once with its latest values, in the order of their beginning."""
         return sorted(self._alarms.all, key=lambda alarm: alarm.since)
+
+
+def summary_of(recording: Recording, counts: Counter[str], wall: float, file: Path | None) -> dict[str, Any]:
+    """Return the numbers of a replay for ``summary.json``."""
+    totals, duration = recording.totals, recording.duration
+    return {
+        "samples": totals.samples,
+        "duration_s": duration,
+        "wall_s": wall,
+        "realtime_factor": duration / wall,
+        "dropped": recording.refused,
+        "outside_validity": counts["deflected"],
+        "events": dict(sorted(counts.items())),
+        "joint_residual_rms_rad": totals.residuals.rms,
+        "joint_residual_normalised_mean": totals.normalised.mean,
+        "joint_residual_normalised_std": totals.normalised.deviation,
+        "tip_acceleration_max_m_s2": totals.acceleration,
+        **_load(totals.load.load),
+        **recording.noise,
+        "output_sha256": None if file is None else sha256_of(file),
+        "alarms": _alarms(recording, recording.first),
+    }
+
+
+def clocks_of(clocks: Mapping[Stream, Clock]) -> dict[str, Any]:
+    """Return the lags and drifts that were estimated, as at the end; empty without any."""
+    if not clocks:
+        return {}
+    found = list(clocks.values())
+    return {
+        "lag_streams": [stream.value for stream in clocks],
+        "lags_s": [clock.lag for clock in found],
+        "lag_sigmas_s": [clock.lag_sigma for clock in found],
+        "clock_drifts_ppm": [1e6 * clock.drift for clock in found],
+        "clock_drift_sigmas_ppm": [1e6 * clock.drift_sigma for clock in found],
+    }
+
+
+def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
+    """Return gaps, clock steps and health alarms in the order of their beginning; seconds since the stamp `first`."""
+    drive = recording.reads.stream.value
+    gaps = [Alarm(drive, "gap", start, end, None, f"for {(end - start) * NANO:.2f} s") for start, end in recording.gaps]
+    gaps += [
+        Alarm(drive, "clock", start, start, None, f"stamps go on at {(end - first) * NANO:.3f} s")
+        for start, end in recording.clock_sets
+    ]
+    return [
+        {
+            "channel": alarm.channel,
+            "kind": alarm.kind,
+            "from_s": max(0.0, (alarm.since - first) * NANO),
+            "to_s": None if alarm.until is None else (alarm.until - first) * NANO,
+            "cause": alarm.cause,
+            "told": alarm.told,
+            "evidence": evidence_with_cause(alarm.evidence, ((rank.cause, rank.probability) for rank in alarm.ranked)),
+            "ranked": [{"cause": rank.cause, "probability": rank.probability} for rank in alarm.ranked],
+        }
+        for alarm in sorted([*gaps, *recording.alarms()], key=lambda alarm: alarm.since)
+    ]
+
+
+def alarm_as_text(alarm: dict[str, Any]) -> str:
+    """Return an alarm of ``summary.json`` in words."""
+    end = "the end" if alarm["to_s"] is None else f"{alarm['to_s']:.2f} s"
+    evidence = f" ({alarm['evidence']})" if alarm["evidence"] else ""
+    return f"{alarm['channel']}, {max(0.0, alarm['from_s']):.2f} s to {end}: {alarm['told']}{evidence}"
+
+
+def _load(load: TipLoad | None) -> dict[str, Any]:
+    """Return the numbers of the unknown load at the tip; empty where only strokes were measured."""
+    if load is None:
+        return {}
+    pulses = load.pulses
+    return {
+        "tip_load": load.text,
+        "tip_load_rms_N": load.rms,
+        "tip_load_sigma_N": load.sigma,
+        "tip_load_pulses_N": None if pulses is None else pulses.height,
+        "tip_load_pulses_sigma_N": None if pulses is None else pulses.height_sigma,
+        "tip_load_frequency_Hz": None if pulses is None else pulses.frequency,
+        "tip_load_frequency_sigma_Hz": None if pulses is None else pulses.frequency_sigma,
+    }

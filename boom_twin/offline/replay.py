@@ -15,32 +15,26 @@ import numpy as np
 
 from .. import __version__
 from ..bag.reader import Session
-from ..bag.session_model import SessionScene, scene_from
-from ..bag.session_sheet import SessionSheet
-from ..bag.time_window import WHOLE, TimeWindow
+from ..bag.session_file import WHOLE, TimeWindow
+from ..bag.session_model import SessionScene, SessionSheet, scene_from
 from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
-from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
 from ..health.sensor_check import sensor_ranges
 from ..messages.sample_decoder import ODDITIES
 from ..scene.load import SceneSource
 from ..system.atomic_files import write_atomic
 from ..system.result_folder import REPLAY, result_folder
-from ..system.summary_display import SummaryDisplay, data_frame
-from ..twin.blocks import CODES, ReportBlock, SampleBlock
-from ..twin.driver import drive_blocks
-from ..twin.events import CONSEQUENCES, EVENTS
-from ..twin.twin import Twin
-from ..types import SENSORS, Array, Change, Report, Stream, StrokeReading
+from ..system.result_text import SummaryDisplay, data_frame
+from ..twin.blocks import CODES, CONSEQUENCES, EVENTS, ResidualBlock, SampleBlock
+from ..twin.twin import Twin, drive
+from ..types import SENSORS, Array, Change, Stream, StrokeReading
 from .ground_truth import TipErrors, TipTruth, truth_in
-from .inputs import USUAL, ReplayInputs, ReplayOptions, replay_inputs
+from .inputs import USUAL, OtherBoom, ReplayInputs, ReplayOptions, replay_inputs
 from .progress import Progress
-from .recording import Recording, Stretch
+from .recording import Recording, Stretch, alarm_as_text, clocks_of, summary_of
 from .sample_table import SampleTable, columns_of
-from .session_samples import SessionSamples
-from .summary import alarm_as_text, clocks_of, summary_of
-from .threads import quick_switches, read_ahead, result_bag
+from .session_samples import SessionSamples, quick_switches, read_ahead, result_bag
 
 SESSION = "session"  # folder in a replay of a table, with the session that was made of it
 
@@ -90,7 +84,7 @@ class Replay(SummaryDisplay):
         return data_frame(self.columns())
 
     def summary_rows(self) -> dict[str, str]:
-        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        """See `boom_twin.system.result_text.SummaryDisplay`."""
         told = self.summary
         return {
             "session": str(self.session.path),
@@ -169,8 +163,8 @@ def replay(
         options = ReplayOptions(progress, mapping, changes, health, window, namespace, with_bag, causes)
         if is_path:
             return replay_into(building, bag, scene, settings, options)
-        from ..loggers.column_file import ColumnFile
-        from ..loggers.import_session import import_session
+        from ..bag.import_session import import_session
+        from ..loggers.assignment import ColumnFile
         from ..loggers.log_table import table_of_frame
 
         kept, place = scene_from(scene), building / SESSION
@@ -219,22 +213,22 @@ def replay_into(
         began = time.perf_counter()
         stack.enter_context(quick_switches())
         items = stack.enter_context(closing(read_ahead(samples)))
-        for step in drive_blocks(twin, (item for item in items if options.changes or not isinstance(item, Change))):
+        for step in drive(twin, twin.take, (item for item in items if options.changes or not isinstance(item, Change))):
             if bar is not None:
                 bar.update(1 if step is None else len(step[0].stamps))
             if step is None:
                 recording.refused += 1
                 continue
-            block, found = step
-            recording.add_samples(block)
-            for each in found:
-                recording.add(each)
-                for health in [r.health for r in each.all] if isinstance(each, Report) else each.health.values():
-                    other_boom.hear(health)
+            block, rows = step
+            recording.add(rows, block)
+            for health in rows.health.values():
+                other_boom.hear(health)
             if put is not None:
-                put(found)
+                put(rows)
             if not other_boom.is_judged:
-                given.refuse(other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
+                given.refuse(
+                    other_boom.take(int(block.stamps[-1]), *(_angles(each, joints) for each in (block, rows.residuals)))
+                )
         given.refuse(other_boom.judge())
     if bar is not None:
         bar.close()
@@ -265,16 +259,9 @@ def replay_into(
     return Replay(summary, recording, session, truth)
 
 
-def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) -> tuple[Array, list[Array]]:
-    """Return the angles of a block of samples, and the residuals of angles that became known, rows (joints,) in rad."""
-    code, residuals = CODES[Stream.ANGLES], []
-    for each in found:
-        if isinstance(each, Report):
-            rows = (row for part in each.all for row in part.residuals)
-            residuals += [row.values for row in rows if row.stream is Stream.ANGLES]
-        else:
-            residuals += list(each.residuals.values[each.residuals.streams == code, :joints])
-    return block.values[block.streams == code, :joints], residuals
+def _angles(block: SampleBlock | ResidualBlock, joints: int) -> Array:
+    """Return the angles in a block of samples, or their residuals, shape (k, joints), rad."""
+    return block.values[block.streams == CODES[Stream.ANGLES], :joints]
 
 
 def _first_refused(given: ReplayInputs) -> str:

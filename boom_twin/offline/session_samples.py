@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter, deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from itertools import repeat
+from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from ..bag.reader import Session, read, read_blocks
-from ..bag.session_blocks import SessionBlocks
-from ..bag.session_file import PARSE_ERRORS
-from ..bag.time_window import WHOLE, TimeWindow
-from ..messages.cdr_decoder import CdrDecoder, stamp_in
-from ..messages.message_block import MessageBlock
-from ..messages.report_encoder import decode_changes
+from ..bag.session_file import PARSE_ERRORS, WHOLE, SessionBlocks, TimeWindow
+from ..bag.writer import RESULT_CHUNK_SIZE, MessageWriter
+from ..config.settings import Settings
+from ..messages.cdr_decoder import CdrDecoder, MessageBlock, stamp_in
+from ..messages.report_encoder import ReportEncoder, decode_changes
 from ..messages.sample_decoder import SampleDecoder
-from ..messages.topic_table import TYPES, Output, Topics
+from ..messages.topic_table import TYPES, Output, Topic, Topics
 from ..messages.type_store import decode
-from ..twin.blocks import CODES, Integers, SampleBlock, block_of, samples_in
+from ..scene.schema import Scene
+from ..twin.blocks import CODES, Integers, ReportBlock, SampleBlock, block_of, samples_in
 from ..types import SENSORS, Array, Change, Sample, Stream
 
 CHANGE_SPAN = 2_000_000_000
@@ -165,3 +170,60 @@ class SessionSamples:
                 yield from samples_in(item, self._joints)
             else:
                 yield item
+
+
+ITEMS_AHEAD = 8  # blocks of samples, or of reports, that wait between two threads
+SWITCH_INTERVAL = 2e-5
+"""Time (s) that a thread keeps the interpreter's lock while another waits; a call of the twin's kernel takes 1 ms."""
+Item = TypeVar("Item")
+
+
+@contextmanager
+def quick_switches() -> Iterator[None]:
+    """Shorten the switch interval of threads, so that the twin does not wait for the decoder of messages."""
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(usual)
+
+
+def read_ahead(items: Iterable[Item]) -> Generator[Item]:
+    """Yield the items of an iterable; a thread reads up to `ITEMS_AHEAD` of them in advance."""
+    iterator, end = iter(items), object()
+    thread = ThreadPoolExecutor(1, "read")
+    try:
+        waiting = deque(thread.submit(next, iterator, end) for _ in range(ITEMS_AHEAD))
+        while (item := waiting.popleft().result()) is not end:
+            waiting.append(thread.submit(next, iterator, end))
+            yield item  # type: ignore[misc]
+    finally:
+        thread.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def result_bag(
+    directory: Path, notes: Mapping[str, str], topics: Topics, scene: Scene, settings: Settings
+) -> Iterator[Callable[[ReportBlock], None]]:
+    """Yield a function that queues reports for a thread, which writes them to a bag.
+
+    The bag is complete if the block ends without an exception. Raise BagError if the bag cannot be written. The function
+    raises it, too.
+    """
+    encoder = ReportEncoder(scene, settings, topics.frame)
+    outputs: dict[str, Topic] = {key: topic for key, topic in topics.outputs.items() if key is not Output.DIAGNOSTICS}
+    with MessageWriter(directory, outputs, notes, chunk_size=RESULT_CHUNK_SIZE) as bag:
+        thread, waiting = ThreadPoolExecutor(1, "write"), deque[Future[None]]()
+
+        def put(rows: ReportBlock) -> None:
+            if len(waiting) == ITEMS_AHEAD:
+                waiting.popleft().result()
+            waiting.append(thread.submit(lambda: bag.write_block(encoder.fill_block(rows))))
+
+        try:
+            yield put
+            for each in waiting:
+                each.result()
+        finally:
+            thread.shutdown(cancel_futures=True)

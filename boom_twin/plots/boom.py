@@ -1,15 +1,16 @@
-"""Side view of a boom in equilibrium, with the symbols of an engineering sketch."""
+"""Side view of a boom with the symbols of an engineering sketch, and the picture of every joint over its range."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..scene.kinematics import JointPins, Skeleton
+from ..scene.kinematics import JointPins, Skeleton, skeleton, stroke_curve
 from ..scene.schema import Scene
 from ..types import Array
-from .style import BLUE, GREY, INK
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,3 +86,85 @@ def section_parts(scene: Scene, bones: Skeleton, i: int) -> list[tuple[Array, Ar
     x0, x1 = section.beam
     stops = [bones.point(i, x) for x in (0.0, x0, x1, section.length)]
     return [(stops[k], stops[k + 1], k == 1 and scene.is_flexible(i)) for k in range(3)]
+
+
+POSITIONS = 5  # of a joint, ends of its range included
+CURVE = 361  # angles
+COLUMNS = 3
+SLENDER = 0.07  # width of a drawn barrel over its closed length
+NOTE = "blue: lowest angle, orange: highest; section before along x"
+
+
+def joint_ranges_picture(path: Path, scene: Scene, name: str) -> Path:
+    """Draw a pair of panels for each joint: pins, links and cylinder over its range, and the stroke; return `path`."""
+    count = len(scene.joints)
+    rows = -(-count // COLUMNS)
+    columns = -(-count // rows)
+    with picture(path, f"{name}: all pins over the range of each joint", NOTE, (18.0, 8.0 * rows)) as figure:
+        grid = figure.add_gridspec(2 * rows, columns, height_ratios=[3.0, 1.0] * rows)
+        for i in range(count):
+            row, column = divmod(i, columns)
+            _joint(figure.add_subplot(grid[2 * row, column]), scene, i)
+            _stroke(figure.add_subplot(grid[2 * row + 1, column]), scene, i)
+    return path
+
+
+def _straight(scene: Scene) -> Array:
+    """Return the joint angles (rad) of the boom as straight as its ranges allow."""
+    return np.asarray(np.radians(np.clip(0.0, *np.transpose([joint.range_deg for joint in scene.joints]))))
+
+
+def _joint(axes: Axes, scene: Scene, i: int) -> None:
+    """Draw sections before and after, links and cylinder: the ends of the range in full, positions between as a shadow."""
+    axes.set_aspect("equal", adjustable="box")
+    straight, pins = _straight(scene), list[Array]()
+    for place, degrees in enumerate(np.linspace(*scene.joints[i].range_deg, POSITIONS)):
+        angles = straight.copy()
+        angles[: i + 1] = 0.0
+        angles[i] = np.radians(degrees)
+        with np.errstate(invalid="ignore"):
+            bones = skeleton(scene, angles)
+        joint = bones.joints[i]
+        if np.isfinite(joint.rod_pin).all():
+            pins += named_pins(joint).values()
+            _mechanism(axes, scene, bones, i, {0: BLUE, POSITIONS - 1: ORANGE}.get(place))
+    low, high = np.min(pins or [np.zeros(2)], axis=0), np.max(pins or [np.ones(2)], axis=0)
+    middle, reach = 0.5 * (low + high), 0.62 * max(*(high - low), 0.05 * scene.reach)
+    axes.set(xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + np.array([-reach, reach]))
+    axes.locator_params(nbins=5)
+    joint_range = " to ".join(f"{degrees:g}" for degrees in scene.joints[i].range_deg)
+    axes.set_title(f"joint {i + 1}, kind {scene.joints[i].kind}: {joint_range} deg")
+
+
+def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | None) -> None:
+    """Draw one position of a joint's mechanism; name its pins, with a bright outline, if `colour` is given."""
+    from matplotlib.patheffects import withStroke
+
+    joint, alpha = bones.joints[i], 0.12 if colour is None else 0.4
+    draw_section(axes, section_parts(scene, bones, i), scene.sections[i].depth, alpha)
+    if i > 0:
+        draw_section(axes, section_parts(scene, bones, i - 1), scene.sections[i - 1].depth, 0.12)
+    for corners, own in zip(joint.links, (GREEN, PURPLE), strict=False):
+        draw_link(axes, corners, PALE if colour is None else own, 2.0 if colour is None else 3.5)
+    if colour is None:
+        axes.plot(*np.transpose([joint.barrel_pin, joint.rod_pin]), color=PALE, linewidth=3.0, zorder=4)
+        return
+    length = scene.joints[i].cylinder.closed_length
+    draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, length, SLENDER * length)
+    for name, pin in named_pins(joint).items():
+        draw_pin(axes, pin, 5.0, colour)
+        axes.annotate(
+            name, (pin[0], pin[1]), (5, 5), textcoords="offset points", fontsize=10, color=colour, weight="bold", zorder=12,
+            path_effects=[withStroke(linewidth=3.0, foreground="white")],
+        )  # fmt: skip
+
+
+def _stroke(axes: Axes, scene: Scene, i: int) -> None:
+    joint = scene.joints[i]
+    degrees = np.linspace(*joint.range_deg, CURVE)
+    axes.axhspan(0.0, joint.cylinder.max_stroke, color=PALE, alpha=0.5, linewidth=0, label="0 to max_stroke")
+    axes.plot(degrees, stroke_curve(scene, i, np.radians(degrees)), color=INK)
+    axes.axhline(0.0, color=GREY, linewidth=0.8)
+    axes.set_xlabel(f"joint {i + 1}, deg")
+    axes.set_ylabel("stroke, m")
+    axes.legend(loc="best", fontsize=10)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -46,17 +47,6 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Orbits:
-    """Motion of k pins with clearance, at m instants."""
-
-    times: Array  # (m,), s
-    names: tuple[str, ...]
-    clearances: Array  # (k,), radial, m
-    pins: Array  # (m, k, 4): offset x, y of the journal (m), force (N), 1 where it touches
-    lost: NDArray[np.int64]  # (k,), how often contact was lost
-
-
-@dataclass(frozen=True)
 class AlarmSpan:
     """Alarm: the channel where it shows, from and to (s; the end of the session while it lasts), and its cause or kind."""
 
@@ -80,7 +70,7 @@ class Density:
 class ResidualDistribution:
     """Distribution of the residuals of one channel over their expected deviations."""
 
-    counts: NDArray[np.int64]  # (b,), between `boom_twin.plots.session_distributions.EDGES`
+    counts: NDArray[np.int64]  # (b,), between `boom_twin.plots.residuals.EDGES`
     mean: float | None  # None without any
     deviation: float | None
     reach: float  # largest residual that a picture is to show, in the unit of the channel; 0 without any
@@ -102,7 +92,7 @@ class SessionDistributions:
 class History:
     """Everything predicted in a replay of m stroke samples, and k rows of residuals of c channels; n joints.
 
-    Of a long session, rows are left out between those that hold the extremes, see `boom_twin.plots.extreme_rows`. Then
+    Of a long session, rows are left out between those that hold the extremes, see `ExtremeRows`. Then
     `distributions` are given, which do not follow from the rows that are left.
     """
 
@@ -122,10 +112,72 @@ class History:
     shapes: list[tuple[float, Array]] = field(default_factory=list)  # deflected centre lines from base to tip, (p, 2), m
     gaps: list[tuple[float, float]] = field(default_factory=list)  # from and to, where strokes were missing
     alarms: list[AlarmSpan] = field(default_factory=list)  # in the order of their beginning
-    moments: Array = field(default_factory=lambda: np.zeros((0, 0)))  # N m at the `boom_twin.analysis.bending_moments.stations`
+    moments: Array = field(default_factory=lambda: np.zeros((0, 0)))  # N m at the `boom_twin.analysis.bending_stress.stations`
     slow_moments: Array = field(default_factory=lambda: np.zeros((0, 0)))  # their static parts
     distributions: SessionDistributions | None = None
     estimate: EstimateTrace | None = None  # None where nothing but strokes was measured
     load_text: str = ""  # size and main frequency of its load, in words
     natural: Array = field(default_factory=lambda: np.zeros((0, 2)))  # (modes, 2), Hz: least and largest over the postures
     section_middles: tuple[int, ...] = ()  # points of `shapes` nearest to the middles of the sections
+
+
+class ExtremeRows:
+    """Table of arrays side by side, `columns`, that keeps all rows while they are few, and of more rows the extremes in bins.
+
+    A row stays if it has the least or the largest value of a key in its bin of consecutive rows. So a curve through the rows
+    that are left spans in every bin what all rows spanned. Bins get twice as wide whenever `most` rows are not enough: the
+    extremes of a wide bin are among those of its halves. `keys` are the columns whose extremes are to be seen.
+    """
+
+    def __init__(self, most: int, keys: Sequence[str]) -> None:
+        self.columns: dict[str, Array] = {}
+        self._most, self._keys, self._width, self._count = most, keys, 1, 0
+        self._numbers: NDArray[np.int64] = np.zeros(0, np.int64)
+
+    def add(self, columns: Mapping[str, Array]) -> None:
+        """Append rows, shapes (k, ..)."""
+        rows = len(next(iter(columns.values())))
+        self._numbers = np.concatenate([self._numbers, self._count + np.arange(rows)])
+        self._count += rows
+        held = self.columns or {name: column[:0] for name, column in columns.items()}
+        self.columns = {name: np.concatenate([held[name], column]) for name, column in columns.items()}
+
+    @property
+    def is_thin(self) -> bool:
+        """Return True if rows have been removed."""
+        return self._width > 1
+
+    @property
+    def is_full(self) -> bool:
+        """Return True if rows must be removed."""
+        return len(self._numbers) > self._most
+
+    def thin(self, kept: NDArray[np.bool_]) -> None:
+        """Remove rows until at most half of the permitted number are left, not counting those `kept`, bool (k,), which stay."""
+        kept = self._take_away(kept)
+        while len(self._numbers) - int(kept.sum()) > self._most // 2 and self._width < self._count:
+            self._width *= 2
+            kept = self._take_away(kept)
+
+    def _take_away(self, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Remove rows with the present width of bins; return which of the rows that are left are kept anyhow."""
+        stays = kept | _extremes(self._numbers // self._width, [self.columns[key] for key in self._keys])
+        self._numbers = self._numbers[stays]
+        self.columns = {name: column[stays] for name, column in self.columns.items()}
+        return kept[stays]
+
+
+def _extremes(bins: NDArray[np.int64], keys: Sequence[Array]) -> NDArray[np.bool_]:
+    """Return True for the first rows with the least or the largest value of a key in their bin; NaN is no value.
+
+    `bins` (k,) ascend; keys have the shape (k,) or (k, c).
+    """
+    starts = np.flatnonzero(np.diff(bins, prepend=-1))
+    sizes = np.diff(starts, append=len(bins))
+    found = np.zeros(len(bins), bool)
+    for column in (column for table in keys for column in table.reshape(len(bins), -1).T):
+        for extreme in (np.fmin, np.fmax):
+            rows = np.flatnonzero(column == np.repeat(extreme.reduceat(column, starts), sizes))
+            _, first = np.unique(bins[rows], return_index=True)
+            found[rows[first]] = True
+    return found

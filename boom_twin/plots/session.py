@@ -1,21 +1,45 @@
-"""Pictures of whole sessions: all of one replay, two compared, a calibration, identified modes."""
+"""Pictures of one replayed session: the tip over time, the deflected boom through the session."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import zip_longest
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..system.child_process import beside
+from ..system.processes import beside
 from ..types import Array
+from .boom import draw_base
 from .history import History, Truth
-from .posture import posture_picture
-from .residuals import SIGMA, has_spectrum, residual_picture, running_mean, spectrum_picture
-from .style import BLUE, GREEN, GREY, ORANGE, SKY, import_plotting, legend_above, picture
-from .tip import tip_picture
+from .residuals import has_spectrum, residual_picture, spectrum_picture
+from .style import (
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PALE,
+    TIME,
+    broken,
+    colours_of_times,
+    extent,
+    import_plotting,
+    legend_above,
+    limits,
+    picture,
+    shade_gaps,
+    side_view,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+ENLARGED_SPAN = 6.0  # s shown enlarged
+TRUTH: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (3, 4))}
+COLOURS = (BLUE, ORANGE)  # of x and y; a prediction is a broad pale line, an estimate a thin dark one over it
+BROAD: dict[str, Any] = {"linewidth": 3.2, "alpha": 0.4}
+BAND = 2.0  # standard deviations that are shaded, as their label says
 
 
 def replay_pictures(
@@ -46,132 +70,180 @@ def replay_pictures(
     return [path for path, is_there in is_drawn.items() if is_there]
 
 
-SHOWN = 30.0  # standard deviations at which a bar is cut off, with its number beside it
+class Panel(NamedTuple):
+    """Quantity of the tip over a session: predicted (m, 2), estimated with deviations, true with its stamps."""
+
+    title: str
+    label: str  # of its axis, with the unit at the end
+    predicted: Array | None
+    estimated: tuple[Array, Array] | None
+    true: tuple[Array, Array] | None = None
+    around: float | None = 0.0  # middle of the axis
 
 
-def compare_picture(path: Path, title: str, names: list[str], apart: list[float], sure: float) -> None:
-    """Write the comparison of two sessions: a bar for every figure.
+def tip_picture(path: Path, session: str, history: History, truth: Truth | None, note: str) -> None:
+    """Write ``tip.png``."""
+    window, panels = most_active_window(history.stamps_s, history.tip_acceleration), _panels(history, truth)
+    count = len(panels)
+    with picture(path, f"{session}: tip motion", note, (16.0, 3.0 * (count + 1))) as figure:
+        grid = figure.add_gridspec(count + 1, 2, height_ratios=[*[1.0, 1.0, 0.8][:count], 1.1])
+        shown: list[Axes] = []
+        for row, panel in enumerate(panels):
+            shown.append(figure.add_subplot(grid[row, :], sharex=shown[0] if shown else None))
+            _over_session(shown[-1], history, panel)
+            shown[-1].tick_params(labelbottom=row == count - 1)
+        shown[-1].set_xlabel(TIME)
+        _mark(shown[1], window)
+        for column in range(2):
+            _enlarged(figure.add_subplot(grid[count, column]), history, truth, window, column)
 
-    It is as long as B minus A over the standard deviation of that, which is no chance from `sure` on.
-    """
-    with picture(path, title, "", (16.0, 2.0 + 0.42 * max(len(names), 1))) as figure:
+
+def most_active_window(stamps: Array, acceleration: Array) -> tuple[float, float]:
+    """Return the span of `ENLARGED_SPAN` s about the largest acceleration (m, 2) in a session; all of a shorter session."""
+    size = np.hypot(acceleration[:, 0], acceleration[:, 1])
+    if not np.isfinite(size).any():
+        return 0.0, ENLARGED_SPAN
+    first, last = float(stamps[0]), float(stamps[-1])
+    start = float(stamps[np.nanargmax(size)]) - 0.35 * ENLARGED_SPAN
+    start = max(first, min(start, last - ENLARGED_SPAN))
+    return start, min(start + ENLARGED_SPAN, max(last, first + 1e-3))
+
+
+def _panels(history: History, truth: Truth | None) -> list[Panel]:
+    estimate, place, acceleration = history.estimate, None, None
+    if truth is not None:
+        rigid = history.tip_position - history.tip_displacement
+        place = history.stamps_s, 1e3 * (_at(history.stamps_s, truth.stamps_s, truth.tip_position) - rigid)
+        acceleration = truth.stamps_s, truth.tip_acceleration
+    found: list[tuple[Array, Array] | None] = [None, None, None]
+    if estimate is not None:
+        displaced = 1e3 * estimate.displacement, 1e3 * estimate.displacement_sigmas
+        found = [displaced, (estimate.acceleration, estimate.acceleration_sigmas), (estimate.load, estimate.load_sigmas)]
+    title = f"Load at the tip that the model does not know: {history.load_text}"
+    panels = [
+        Panel("Displacement, x forward, y up", "displacement, mm", 1e3 * history.tip_displacement, found[0], place, None),
+        Panel("Acceleration, no gravity", "acceleration, m/s²", history.tip_acceleration, found[1], acceleration),
+        Panel(title, "force, N", None, found[2]),
+    ]
+    return panels if estimate is not None else panels[:2]
+
+
+def _at(stamps: Array, at: Array, values: Array) -> Array:
+    """Return `values` (t, 2) known at `at`, linearly interpolated at `stamps`; NaN outside."""
+    return np.stack([np.interp(stamps, at, column, left=np.nan, right=np.nan) for column in values.T], axis=1)
+
+
+def _over_session(axes: Axes, history: History, panel: Panel) -> None:
+    extents, errors = [], []
+    if panel.predicted is not None:
+        stamps, drawn = broken(history.stamps_s, panel.predicted, history.gaps)
+        for name, column, colour in zip("xy", drawn.T, COLOURS, strict=True):
+            axes.plot(stamps, column, color=colour, label=f"predicted {name}", **BROAD)
+        extents.append(panel.predicted)
+        errors.append(("prediction", panel.predicted))
+    if panel.estimated is not None:
+        values, sigmas = panel.estimated
+        stamps, drawn = broken(history.stamps_s, values, history.gaps)
+        _, bands = broken(history.stamps_s, BAND * sigmas, history.gaps)
+        for i, colour in enumerate(COLOURS):
+            label = f"estimated {'xy'[i]}{', ±2 sigma' if i else ''}"
+            axes.plot(stamps, drawn[:, i], color=colour, linewidth=1.0, label=label)
+            low, high = drawn[:, i] - bands[:, i], drawn[:, i] + bands[:, i]
+            axes.fill_between(stamps, low, high, color=colour, alpha=0.22, linewidth=0)
+        usual = BAND * np.nanmedian(sigmas, axis=0)
+        extents += [values - usual, values + usual]
+        errors.append(("estimate", values))
+    title = panel.title
+    if panel.true is not None:
+        there = _at(history.stamps_s, *panel.true)
+        told = ", ".join(f"{kind} {_rms(values - there):.2g}" for kind, values in errors)
+        title += f"; rms error: {told} {panel.label.split()[-1]}"
+        for i in range(2):
+            axes.plot(panel.true[0], panel.true[1][:, i], **TRUTH, label="" if i else "truth")
+        extents.append(panel.true[1])
+    axes.set_ylim(*limits(*extents, around=panel.around))
+    axes.set_ylabel(panel.label)
+    axes.set_title(title)
+    shade_gaps(axes, history.gaps)
+    axes.set_xlim(extent(history.stamps_s))
+    legend_above(axes, 5, 0.99, handlelength=1.6, columnspacing=1.1)
+
+
+def _rms(gap: Array) -> float:
+    return float(np.sqrt(np.nanmean(np.sum(gap**2, axis=1)))) if np.isfinite(gap).any() else float("nan")
+
+
+def _mark(axes: Axes, window: tuple[float, float]) -> None:
+    axes.axvspan(*window, color=PALE, alpha=0.6, linewidth=0, zorder=0.4)
+    late = sum(window) > sum(axes.get_xlim())
+    place, shift, side = (window[0], -4, "right") if late else (window[1], 4, "left")
+    axes.annotate(
+        "enlarged below", (place, 0.04), xycoords=axes.get_xaxis_transform(), xytext=(shift, 0),
+        textcoords="offset points", ha=side, fontsize=11, color=GREY,
+    )  # fmt: skip
+
+
+def _enlarged(axes: Axes, history: History, truth: Truth | None, window: tuple[float, float], i: int) -> None:
+    """Draw component `i` of the IMU's specific force in the window, or of the tip's acceleration without an IMU."""
+    curves: list[tuple[str, Array, Array, dict[str, Any]]] = []
+    if history.imu is not None:
+        title, label = f"Specific force {('x, along the tip', 'z, across it')[i]}", "specific force, m/s²"
+        curves.append(("measured", history.imu.stamps_s, history.imu.measured, {"color": GREY, "linewidth": 0.9}))
+        curves.append(("predicted", history.imu.stamps_s, history.imu.predicted, {"color": COLOURS[i], "linewidth": 1.6}))
+    else:
+        title, label = f"Tip acceleration {'xy'[i]}", "acceleration, m/s²"
+        curves.append(("predicted", history.stamps_s, history.tip_acceleration, {"color": COLOURS[i]}))
+        if truth is not None:
+            curves.append(("truth", truth.stamps_s, truth.tip_acceleration, TRUTH))
+    shown = []
+    for name, stamps, values, look in curves:
+        inside = (stamps >= window[0]) & (stamps <= window[1])
+        shown.append(values[inside, i])
+        axes.plot(stamps[inside], shown[-1], label=name, **look)
+    axes.set_ylim(*limits(*shown))
+    axes.set_title(title)
+    axes.set_ylabel(label)
+    shade_gaps(axes, [gap for gap in history.gaps if gap[0] < window[1] and gap[1] > window[0]])
+    axes.set_xlim(*window)
+    axes.set_xlabel(TIME)
+    legend_above(axes, 3, 0.99, handlelength=1.6)
+
+
+MOST_LINES = 24
+
+
+def posture_picture(path: Path, session: str, history: History, note: str) -> None:
+    """Write the picture of the deflected boom at instants of a session."""
+    with picture(path, f"{session}: deflected boom through the session", note) as figure:
         axes = figure.add_subplot()
-        places = np.arange(len(names))
-        axes.axvspan(-sure, sure, color=GREEN, alpha=0.12, linewidth=0, label="may be chance")
-        colours = [ORANGE if abs(value) > sure else GREY for value in apart]
-        axes.barh(places, np.clip(apart, -SHOWN, SHOWN), height=0.7, color=colours)
-        for place, value in zip(places, apart, strict=True):
-            if abs(value) > SHOWN:
-                side = "left" if value > 0.0 else "right"
-                axes.annotate(f"{value:+.0f}", (np.sign(value) * SHOWN, place), va="center", ha=side)
-        axes.set_yticks(places, names)
-        axes.set_ylim(len(names) - 0.4, -0.6)
-        axes.set_xlim(-SHOWN - 4.0, SHOWN + 4.0)
-        axes.grid(axis="y", visible=False)
-        axes.set_xlabel("B minus A, standard deviations")
-        legend_above(axes)
+        side_view(axes)
+        colours = colours_of_times(figure, axes, history.stamps_s, TIME)
+        chosen = [history.shapes[k] for k in spread(len(history.shapes), MOST_LINES)]
+        for stamp, line in chosen[1:-1]:
+            axes.plot(*line.T, color=colours(stamp), linewidth=1.4)
+        _, tip = broken(history.stamps_s, history.tip_position, history.gaps)
+        axes.plot(*tip.T, color=ORANGE, linewidth=1.2, label="tip trace")
+        for (stamp, line), colour, name in zip(chosen[:1] + chosen[-1:], (GREEN, INK), ("first", "last"), strict=False):
+            axes.plot(*line.T, color=colour, linewidth=3.2, label=f"{name}, at {stamp:.1f} s")
+            axes.plot(*line[-1], "o", color=colour, markersize=8)
+        for number, middle in enumerate(history.section_middles if chosen else (), 1):
+            _name_section(axes, chosen[-1][1], middle, number)
+        draw_base(axes, chosen[0][1][0] if chosen else np.zeros(2), 0.45)
+        axes.margins(0.06)
+        axes.legend(loc="upper right")
 
 
-@dataclass(frozen=True)
-class Interval:
-    """Parameter as it is drawn: name, unit, value before, estimate and its interval, and whether it was taken over."""
+def _name_section(axes: Axes, line: Array, middle: int, number: int) -> None:
+    from matplotlib.patheffects import withStroke
 
-    name: str
-    unit: str
-    before: float
-    now: float
-    low: float
-    high: float
-    told: bool
+    (x, y), along = line[middle], line[min(middle + 1, len(line) - 1)] - line[max(middle - 1, 0)]
+    across = np.array([along[1], -along[0]]) / max(float(np.hypot(*along)), 1e-9)
+    axes.annotate(
+        f"section {number}", (x, y), tuple(across * [42, 16]), textcoords="offset points", ha="center", va="center",
+        fontsize=12, color=INK, zorder=10, path_effects=[withStroke(linewidth=3.0, foreground="white")],
+    )  # fmt: skip
 
 
-def held_out_picture(
-    path: Path, title: str, note: str, names: Sequence[str], times: tuple[Array, Array], normalised: tuple[Array, Array]
-) -> None:
-    """Draw residuals over their expected deviation, before on the left and after on the right.
-
-    For each there are `times` (k,) in s, and `normalised` residuals (k, channels), NaN where not measured.
-    """
-    with picture(path, title, note, (16.0, max(6.0, 1.2 + 1.5 * len(names)))) as figure:
-        panels = figure.subplots(len(names), 2, squeeze=False, sharex="col")
-        for column, (word, at, values) in enumerate(zip(("before", "after"), times, normalised, strict=True)):
-            for row, name in enumerate(names):
-                axes, known = panels[row, column], np.isfinite(values[:, row])
-                stamps, shown = at[known], values[known, row]
-                axes.axhspan(-3.0, 3.0, color=SKY, alpha=0.22, linewidth=0)
-                if stamps.size:
-                    order = np.argsort(stamps)
-                    stamps, shown = stamps[order], shown[order]
-                    axes.plot(stamps, shown, ".", color=BLUE, markersize=2.0, alpha=0.5, markeredgewidth=0)
-                    axes.plot(stamps, running_mean(stamps, shown), color=ORANGE, linewidth=1.6)
-                    axes.set_title(f"{word}: rms {np.sqrt(np.mean(shown**2)):.2f}", fontsize=11)
-                axes.set_ylabel(f"{name} / {SIGMA}")
-            panels[-1, column].set_xlabel("time of what was held out, s")
-
-
-def parameters_picture(path: Path, title: str, note: str, intervals: Sequence[Interval]) -> None:
-    """Draw one row for each parameter: before, estimate, 95 % interval; shares in percent of the value before."""
-    groups = list(dict.fromkeys(interval.unit for interval in intervals))
-    counts = [sum(interval.unit == unit for interval in intervals) for unit in groups]
-    with picture(path, title, note, (12.0, 1.6 + 0.8 * len(groups) + 0.4 * sum(counts))) as figure:
-        panels = figure.subplots(len(groups), 1, squeeze=False, height_ratios=[1 + count for count in counts])[:, 0]
-        for axes, unit in zip(panels, groups, strict=True):
-            members = [interval for interval in intervals if interval.unit == unit]
-            for row, each in enumerate(members):
-                colour = BLUE if each.told else GREY
-                axes.plot([each.low, each.high], [row, row], color=colour, linewidth=3.0, solid_capstyle="butt")
-                axes.plot(each.now, row, "o", color=colour, markersize=7)
-                axes.plot(each.before, row, "x", color=ORANGE, markersize=9, markeredgewidth=2.0)
-            axes.set_yticks(range(len(members)), [each.name for each in members])
-            axes.set_ylim(len(members) - 0.4, -0.6)
-            axes.set_xlabel(unit)
-        legend = "cross: before; dot and bar: estimate, 95 % interval; grey: cannot be told, left as before"
-        panels[0].set_title(legend, fontsize=11)
-
-
-@dataclass(frozen=True)
-class Trend:
-    """Figure of k sessions: name with unit, ascending times (s since 1970), values, standard deviations (0: not known)."""
-
-    label: str
-    times: Sequence[float]
-    values: Sequence[float]
-    sigmas: Sequence[float]
-
-
-def trends_picture(path: Path, title: str, trends: Sequence[Trend]) -> None:
-    """Draw every figure over the time of its sessions, with its value in the first and in the last of them."""
-    rows = -(-len(trends) // 2)
-    with picture(path, title, "", (16.0, 0.8 + 2.4 * rows)) as figure:
-        panels = figure.subplots(rows, 2, squeeze=False, sharex=True)
-        for axes, trend in zip_longest(panels.flat, trends):
-            if trend is None:
-                axes.set_axis_off()
-                continue
-            times = np.asarray(trend.times).astype("datetime64[s]")
-            axes.errorbar(times, trend.values, trend.sigmas, color=SKY, marker="o", markerfacecolor=BLUE, ecolor=GREY)
-            axes.set_title(f"{trend.label}: {trend.values[0]:.4g} in the first session, {trend.values[-1]:.4g} in the last")
-            axes.ticklabel_format(axis="y", useOffset=False)
-            axes.xaxis.set_tick_params(labelbottom=True)
-
-
-def stabilisation_picture(path: Path, title: str, poles: Array, modes: Array, model: Array) -> None:
-    """Draw poles, identified modes, and natural frequencies of the model (k,), Hz.
-
-    `poles` (p, 3): frequency (Hz), model order, and 1 if stable, else 0. `modes` (m, 2): frequencies and deviations, Hz.
-    """
-    with picture(path, title, "a pole is stable if it stays the same at the next model order") as figure:
-        axes = figure.subplots()
-        for is_stable, colour, size, label in ((0.0, GREY, 9, "pole"), (1.0, BLUE, 22, "stable pole")):
-            own = poles[poles[:, 2] == is_stable]
-            axes.scatter(own[:, 0], own[:, 1], s=size, color=colour, label=label, linewidths=0)
-        for number, (frequency, sigma) in enumerate(modes):
-            low, high = frequency - 2.0 * sigma, frequency + 2.0 * sigma
-            axes.axvspan(low, high, color=BLUE, alpha=0.2, linewidth=0, label="" if number else "mode, two deviations")
-        for number, frequency in enumerate(model):
-            axes.axvline(frequency, color=ORANGE, linestyle=":", label="" if number else "model")
-        axes.set_xlabel("frequency, Hz")
-        axes.set_ylabel("model order")
-        highest = max(np.max(poles[:, 0], initial=1.0), np.max(modes[:, 0], initial=1.0))
-        axes.set_xlim(0.0, 1.02 * float(highest))
-        legend_above(axes, 4)
+def spread(count: int, most: int) -> list[int]:
+    """Return at most `most` of `count` indices, evenly spaced, with the first and the last."""
+    return sorted({round(place) for place in np.linspace(0, count - 1, min(count, most))}) if count else []

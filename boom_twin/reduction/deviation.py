@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.equilibrium import settle
-from ..analysis.methods import integrate_with
+from ..analysis.methods import DURATION, Motion, integrate_with, motion_of
 from ..analysis.modal import natural_modes
-from ..analysis.motions import DURATION, Motion, motion_of
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..errors import SolverError
@@ -19,10 +18,7 @@ from ..scene.kinematics import posture_angles, strokes_of_posture
 from ..scene.schema import Scene
 from ..types import Array
 
-COMPARED_STEP = 1e-3  # s
-COMPARED_EVERY = 4
 FREQUENCIES = 3
-FREQUENCY_ACCURACY = 1e-7  # relative, of a frequency's bracket
 
 
 @dataclass(frozen=True)
@@ -33,8 +29,8 @@ class StrokeCourse:
     strokes: Array  # (m + 1, n), strokes, m
     angles: Array  # (m + 1, n), joint angles of the undeformed boom there, rad
     motion: Motion
-    step: float = COMPARED_STEP  # s; the tip is compared after every `every` of them
-    every: int = COMPARED_EVERY
+    step: float = 1e-3  # s; the tip is compared after every `every` of them
+    every: int = 4
 
 
 @dataclass(frozen=True)
@@ -94,7 +90,7 @@ def _at_rest(plan: Plan, course: StrokeCourse, frequencies: int) -> tuple[Array,
     for k, (strokes, angles) in enumerate(zip(course.strokes, course.angles, strict=True)):
         settle(plan, state, work, strokes, angles)
         tips[k] = state.frames[-1, :2]
-    modes = natural_modes(plan, state, work, frequencies, FREQUENCY_ACCURACY)
+    modes = natural_modes(plan, state, work, frequencies, 1e-7)
     return tips, np.array([mode.frequency for mode in modes])
 
 

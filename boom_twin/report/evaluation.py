@@ -14,9 +14,8 @@ from ..offline.recording import Stretch
 from ..offline.replay import Replay, replay_into
 from ..plots import History
 from ..scene.schema import Scene
-from ..types import Array
 from .fatigue import Fatigue, FatigueCounter
-from .quantities import Load, QuantityBuilder, write
+from .quantities import Load, Quantity, QuantityBuilder, write
 from .vibration import RestFinder, RestPeriod
 
 
@@ -29,33 +28,26 @@ class Evaluation:
     history: History
     rests: list[RestPeriod]
     loads: list[Load]  # of all stations, that of the largest stress first
-    has_heights: bool  # the stresses are by heights that the scene or the user gave
     fatigue: list[Fatigue]  # of all stations, if it was asked for
     category: float | None  # detail category (MPa) that it was asked for
-    file: Path  # of the figures
+    quantities: list[Quantity]
 
     @property
-    def name(self) -> str:
-        """Name of the session."""
-        return self.result.session.path.resolve().name
-
-    @property
-    def origin(self) -> str:
-        """Origin of the session; empty if it states none."""
-        return self.result.session.notes.get("origin", "")
+    def has_heights(self) -> bool:
+        """Return True if the stresses are by heights that the scene gives."""
+        return all(part.height for part in self.scene.sections if part.beam is not None)
 
 
 class Evaluator:
     """Evaluation of a replay block by block. Its `add` is the function to give to `boom_twin.offline.replay.replay_into`.
 
-    `heights` (n,) of the sections, m, are for the stresses, see `boom_twin.analysis.bending_stress.section_moduli`. Fatigue is
-    computed for a detail `category` (MPa), without one not at all.
+    Fatigue is computed for a detail `category` (MPa), without one not at all.
     """
 
-    def __init__(self, scene: Scene, settings: Settings, heights: Array | None = None, category: float | None = None) -> None:
-        self._scene, self._settings, self._heights, self._category = scene, settings, heights, category
+    def __init__(self, scene: Scene, category: float | None = None) -> None:
+        self._scene, self._category = scene, category
         self._history, self._quantities, self._rests = HistoryBuilder(scene), QuantityBuilder(scene), RestFinder(scene)
-        self._fatigue = None if category is None else FatigueCounter(scene, category, heights)
+        self._fatigue = None if category is None else FatigueCounter(scene, category)
 
     def add(self, stretch: Stretch) -> None:
         """Add the next block of the replay."""
@@ -68,19 +60,11 @@ class Evaluator:
     def finish(self, result: Replay, folder: Path) -> Evaluation:
         """Return the evaluation of the replay and write its figures into `folder`; to be called once."""
         rests = self._rests.finish()
-        found = self._quantities.quantities(result.recording.totals.tip_sigma, rests, self._settings)
-        heights = self._heights is not None or all(part.height for part in self._scene.sections if part.beam is not None)
-        return Evaluation(
-            result,
-            self._scene,
-            self._history.history(result.recording),
-            rests,
-            self._quantities.loads.most_loaded(self._heights),
-            heights,
-            [] if self._fatigue is None else self._fatigue.results(),
-            self._category,
-            write(folder, self._scene, found),
-        )
+        found = self._quantities.quantities(result.recording.totals.tip_sigma, rests)
+        history, loads = self._history.history(result.recording), self._quantities.loads.most_loaded()
+        fatigue = [] if self._fatigue is None else self._fatigue.results()
+        write(folder, self._scene, found)
+        return Evaluation(result, self._scene, history, rests, loads, fatigue, self._category, found)
 
 
 def evaluated_replay(
@@ -89,15 +73,14 @@ def evaluated_replay(
     scene: SessionScene,
     settings: Settings,
     options: ReplayOptions = USUAL,
-    heights: Array | None = None,
     category: float | None = None,
     also: Callable[[Stretch], None] | None = None,
 ) -> Evaluation:
     """Replay a session into the folder `building` as `replay_into` does, with its figures; return its evaluation.
 
-    `heights` and `category` are those of `Evaluator`; `also` is given each stretch too.
+    `category` is that of `Evaluator`; `also` is given each stretch too.
     """
-    evaluator = Evaluator(scene.scene, settings, heights, category)
+    evaluator = Evaluator(scene.scene, category)
 
     def take(stretch: Stretch) -> None:
         evaluator.add(stretch)

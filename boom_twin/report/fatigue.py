@@ -18,8 +18,7 @@ from importlib import import_module
 
 import numpy as np
 
-from ..analysis.bending_moments import Station, stations
-from ..analysis.bending_stress import section_moduli
+from ..analysis.bending_stress import Station, section_moduli, stations
 from ..errors import UsageError
 from ..plots import History
 from ..scene.schema import Scene
@@ -118,16 +117,13 @@ class RainflowCounter:
 
 
 class FatigueCounter:
-    """Fatigue of all stations, added up over the blocks of a session.
+    """Fatigue of all stations of one detail `category`, MPa, added up over the blocks of a session."""
 
-    `category` is the detail category of all stations, MPa; for `heights` see `boom_twin.analysis.bending_stress`.
-    """
-
-    def __init__(self, scene: Scene, category: float, heights: Array | None = None) -> None:
+    def __init__(self, scene: Scene, category: float) -> None:
         if not (np.isfinite(category) and category > 0.0):
             raise UsageError(f"--fatigue {category:g}: a detail category is above 0, in MPa. Take {CATEGORY:g}.")
         self.category, self._stations = category, stations(scene)
-        self._moduli = section_moduli(scene, heights)[[station.section for station in self._stations]]
+        self._moduli = section_moduli(scene)[[station.section for station in self._stations]]
         self._counters = [RainflowCounter() for _ in self._stations]
 
     def add(self, history: History) -> None:

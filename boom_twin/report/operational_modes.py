@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..calibration.rest_periods import RestPeriod, Rigging, channel_names, rest_periods
-from ..calibration.sessions import MeasuredSession
+from ..calibration.sessions import MeasuredSession, RestPeriod, Rigging, channel_names, rest_periods
 from ..deviation.predictor import BoomPredictor
 from ..errors import BagError, UsageError
 from ..scene.schema import Scene

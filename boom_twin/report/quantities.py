@@ -1,32 +1,33 @@
-"""Quantities of a session with standard deviations, for comparing sessions; also bending moments and stresses."""
+"""Quantities of a session with standard deviations; two sessions compared by them; also bending moments and stresses."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, fields
 from hashlib import sha256
 from math import hypot, sqrt
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..analysis.bending_moments import Station, stations
-from ..analysis.bending_stress import BendingStressModel
-from ..config.settings import Settings
+from ..analysis.bending_stress import BendingStressModel, Station, stations
+from ..bag.session_file import WHOLE, TimeWindow
+from ..bag.session_model import incompleteness
+from ..bag.writer import FILE_NAME as RESULT
 from ..errors import BagError, UsageError
+from ..offline.recording import alarm_as_text
 from ..plots import History
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
-from ..system.received_files import open_received
-from ..types import SENSORS, Array, Stream, sensor_kind, stream_of
+from ..system.received_files import holds_file, open_received, sha256_of
+from ..types import Array, Stream, sensor_kind, stream_of
 from .vibration import RestPeriod
 
 FILE_NAME = "quantities.json"
 BATCHES = 10  # number of batches for the standard deviation of a mean (method of batch means)
-LEG = 1e-3  # reversal (m) of a stroke that begins a new leg
 MODEL_ERROR: dict[Stream | None, float] = {Stream.ANGLES: 5e-5, Stream.IMU: 0.02}
 """Standard deviation of the model error of a reading in one posture, by stream; rad, m/s^2."""
 FREQUENCY_ERROR = 0.01  # relative standard deviation of the model's natural frequencies in one posture
@@ -49,7 +50,6 @@ class QuantityBuilder:
         self._scene = scene
         self._channels: dict[str, tuple[BatchMeans, BatchMeans]] = {}  # means of values and of squares
         self._displacement = self._acceleration = 0.0
-        self._travels = [PathLength() for _ in scene.joints]
         self.loads = SectionLoads(scene)
 
     def add(self, history: History, load: Array, variance: Array) -> None:
@@ -61,11 +61,9 @@ class QuantityBuilder:
             squares.add(values**2)
         self._displacement = max(self._displacement, float(np.hypot(*history.tip_displacement.T).max()))
         self._acceleration = max(self._acceleration, float(np.hypot(*history.tip_acceleration.T).max()))
-        for travel, stroke in zip(self._travels, history.strokes.T, strict=True):
-            travel.add(stroke)
         self.loads.add(history, load, variance)
 
-    def quantities(self, tip_sigma: float | None, rests: list[RestPeriod], settings: Settings) -> list[Quantity]:
+    def quantities(self, tip_sigma: float | None, rests: list[RestPeriod]) -> list[Quantity]:
         """Return all quantities; `tip_sigma` is the largest standard deviation of the predicted tip, m, or None."""
         return [
             *self._residuals(),
@@ -76,7 +74,6 @@ class QuantityBuilder:
                 Quantity(f"bending_moment_max_section_{section + 1}", moment, None, "N m")
                 for section, moment in self.loads.moments.items()
             ),
-            *self._stroke_travels(settings),
         ]
 
     def _residuals(self) -> Iterator[Quantity]:
@@ -95,13 +92,6 @@ class QuantityBuilder:
                 rms_error = hypot(square_sigma, 2.0 * mean * error) / (2.0 * rms) if rms else 0.0
             yield Quantity(f"residual_mean_{name}", mean, mean_error, unit)
             yield Quantity(f"residual_rms_{name}", rms, rms_error, unit)
-
-    def _stroke_travels(self, settings: Settings) -> Iterator[Quantity]:
-        for i, travel in enumerate(self._travels):
-            length, legs = travel.length
-            yield Quantity(
-                f"stroke_travel_cylinder_{i + 1}", length, sqrt(2.0 * legs * settings.variance(SENSORS[Stream.STROKES])), "m"
-            )
 
 
 class BatchMeans:
@@ -143,36 +133,6 @@ def _weighted(name: str, rows: Array, error: float) -> Quantity:
     mean = float(weights @ rows[:, 0] / weights.sum())
     scatter = float(weights @ (rows[:, 0] - mean) ** 2 / max(len(rows) - 1, 1))
     return Quantity(name, mean, hypot(sqrt(max(1.0, scatter) / weights.sum()), error), "1")
-
-
-class PathLength:
-    """Total travel of a stroke, and its number of legs. Reversals smaller than `LEG` are ignored as noise."""
-
-    def __init__(self) -> None:
-        self._begin: float | None = None
-        self._extreme, self._way = 0.0, 0
-        self._travel, self._legs = 0.0, 0
-
-    def add(self, stroke: Array) -> None:
-        """Add the next stroke values (m), shape (k,), k >= 1."""
-        begin = float(stroke[0]) if self._begin is None else self._begin
-        extreme, way = begin if self._begin is None else self._extreme, self._way
-        for value in stroke.tolist():
-            if way and (extreme - value) * way > LEG:
-                self._travel, self._legs = self._travel + abs(extreme - begin), self._legs + 1
-                begin, extreme, way = extreme, value, -way
-            elif not way and abs(value - begin) > LEG:
-                extreme, way = value, 1 if value > begin else -1
-            elif way and (value - extreme) * way > 0.0:
-                extreme = value
-        self._begin, self._extreme, self._way = begin, extreme, way
-
-    @property
-    def length(self) -> tuple[float, int]:
-        """Travel so far (m), and number of legs."""
-        if not self._way or self._begin is None:
-            return 0.0, 0
-        return self._travel + abs(self._extreme - self._begin), self._legs + 1
 
 
 def write(folder: Path, scene: Scene, found: list[Quantity]) -> Path:
@@ -245,14 +205,11 @@ class SectionLoads:
             found[section] = max(found.get(section, 0.0), abs(own.moment))
         return found
 
-    def most_loaded(self, heights: Array | None) -> list[Load]:
-        """Return the load of every station, that of the largest stress first.
-
-        `heights` (n,) are the section heights, m. None: those of the scene, else those of thin-walled boxes.
-        """
+    def most_loaded(self) -> list[Load]:
+        """Return the load of every station, that of the largest stress first; see `BendingStressModel`."""
         if not self._largest:
             return []
-        model, found = BendingStressModel(self._scene, heights), []
+        model, found = BendingStressModel(self._scene), []
         for column, own in self._largest.items():
             unknown = sigma = math.nan
             if own.load.any():
@@ -275,15 +232,106 @@ class _Largest(NamedTuple):
     variance: Array  # N^2, of `load`
 
 
-def section_heights(text: str | None, scene: Scene) -> Array | None:
-    """Return the section heights (m) from ``h1,h2,..``; raise UsageError unless every section has one above 0."""
-    if text is None:
-        return None
-    count = len(scene.sections)
+@dataclass(frozen=True)
+class ComparedSession:
+    """Figures and alarms of one session, for a comparison."""
+
+    name: str
+    scene: str  # digest of its scene
+    quantities: list[Quantity]
+    alarms: list[dict[str, Any]]  # as in ``summary.json``
+    incomplete: str = ""  # why the session is not whole, in words
+
+
+def side_of(path: Path, replayed: Callable[[Path], Path], window: TimeWindow = WHOLE) -> ComparedSession:
+    """Return one side from a replay folder, or from a session that `replayed` makes one of, for the `window`.
+
+    BagError if the session cannot be replayed, or the folder is incomplete or without figures that can be read. UsageError
+    for a window of a replay folder, which has its own.
+    """
+    is_replay = holds_file(path / "summary.json")
+    if is_replay and (told := incompleteness(path)):
+        raise BagError(f"{path}: {told}")
+    if is_replay and window != WHOLE:
+        raise UsageError(f"{path}: a replay folder has its own window. Give the session itself with --start and --duration.")
+    folder = path if is_replay else replayed(path)
+    scene, found = read(folder)
     try:
-        heights = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        heights = np.zeros(0)
-    if len(heights) != count or not (np.isfinite(heights) & (heights > 0.0)).all():
-        raise UsageError(f"--section-height {text}: give {count} heights above 0, in m, with commas between them.")
-    return heights
+        with open_received(folder / "summary.json") as file:
+            summary = json.load(file)
+        alarms, told = list(summary["alarms"]), summary["output_sha256"]
+        incomplete = str(summary.get("session_incomplete", ""))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BagError(f"{folder / 'summary.json'}: {error}. Replay the session again with `boom_twin replay`.") from None
+    bag = folder / "bag" / RESULT
+    if bag.is_file() and sha256_of(bag) != told:
+        raise BagError(f"{folder}: summary.json is not of the bag beside it. Replay the session again with `boom_twin replay`.")
+    return ComparedSession(path.resolve().name, scene, found, alarms, incomplete)
+
+
+SIGNIFICANT = 4.0
+"""Standard deviations from which a difference is no chance: one in a thousand for means of ten batches (t distribution)."""
+
+
+@dataclass(frozen=True, slots=True)
+class ComparisonRow:
+    """One figure of both sessions, None where a session has none of it."""
+
+    name: str
+    unit: str
+    a: float | None
+    b: float | None
+    difference: float | None = None  # b minus a
+    sigma: float | None = None  # standard deviation of the difference; None where that of a or b is not known
+    is_significant: bool | None = None  # None where that is not known
+
+
+def rows_of(one: ComparedSession, other: ComparedSession) -> list[ComparisonRow]:
+    """Return all figures that either session has, in the order of the first."""
+    left, right = ({each.name: each for each in side.quantities} for side in (one, other))
+    return [_row(name, left.get(name), right.get(name)) for name in dict.fromkeys([*left, *right])]
+
+
+def _row(name: str, a: Quantity | None, b: Quantity | None) -> ComparisonRow:
+    if a is None or b is None:
+        known = a or b
+        assert known is not None
+        return ComparisonRow(name, known.unit, a.value if a else None, b.value if b else None)
+    difference = b.value - a.value
+    if a.sigma is None or b.sigma is None:
+        return ComparisonRow(name, a.unit, a.value, b.value, difference)
+    sigma = hypot(a.sigma, b.sigma)
+    return ComparisonRow(name, a.unit, a.value, b.value, difference, sigma, abs(difference) > SIGNIFICANT * sigma)
+
+
+def flat(one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> dict[str, Any]:
+    """Return a comparison as one flat object: every column of the table as a list, and the alarms in words."""
+    return {
+        "session_a": one.name,
+        "session_b": other.name,
+        "incomplete_a": one.incomplete or None,
+        "incomplete_b": other.incomplete or None,
+        "same_scene": one.scene == other.scene,
+        **{each.name: [getattr(row, each.name) for row in rows] for each in fields(ComparisonRow)},
+        "alarms_a": [alarm_as_text(alarm) for alarm in one.alarms],
+        "alarms_b": [alarm_as_text(alarm) for alarm in other.alarms],
+    }
+
+
+def as_text(one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> list[str]:
+    """Return the lines of a table, then of the alarms."""
+    lines = [f"{'':32s} {'A':>12s} {'B':>12s} {'B - A':>12s} {'+-':>10s}"]
+    for row in rows:
+        numbers = "".join(f" {_number(value):>12s}" for value in (row.a, row.b, row.difference))
+        mark = {True: "differs", False: "", None: "?"}[row.is_significant]
+        lines.append(f"{row.name:32s}{numbers} {_number(row.sigma):>10s}  {row.unit:6s} {mark}".rstrip())
+    lines += ["", f"differs: by more than {SIGNIFICANT:g} standard deviations; ?: it is not known how sure the figures are"]
+    lines.append("damping, peaks and moments also differ where postures and moves do")
+    for letter, side in (("A", one), ("B", other)):
+        lines.append(f"alarms of {letter}, {side.name}: {len(side.alarms) or 'none'}")
+        lines += [f"  {alarm_as_text(alarm)}" for alarm in side.alarms]
+    return lines
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"

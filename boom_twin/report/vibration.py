@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis.even_times import spacing, unbroken
 from ..analysis.free_vibration import ORDER, Vibration, free_vibrations, is_free
 from ..analysis.posture_modes import ModeList
+from ..analysis.sample_series import spacing, unbroken
 from ..plots import History
 from ..scene.schema import Scene
 from ..scene.summary import weight_of

@@ -11,9 +11,8 @@ import rclpy
 from rcl_interfaces.msg import Log
 from rclpy.qos import ReliabilityPolicy
 from rclpy.subscription import Subscription
-from std_srvs.srv import Trigger
 
-from ..messages.topic_table import NODE, Output, Topics
+from ..messages.topic_table import Output, Topics
 from ..monitor.data.feed import Feed
 from ..monitor.data.store import Store
 from ..scene.schema import Scene
@@ -51,21 +50,15 @@ class TopicFeed(Feed):
                 self._heard.append((heard, topic.absolute))
         events = topics.events
         self._events = self._node.create_publisher(Log, events.absolute, qos_profile(events.qos))
-        self._asked = self._node.create_client(Trigger, f"{NODE}/acknowledge")
 
     def poll(self) -> None:
-        """Take the messages that have arrived, and the node's answer to `release_alarms`."""
+        """Take the messages that have arrived."""
         now = time.monotonic()
         for subscription, name in self._heard:
             with subscription.handle:
                 receive = partial(subscription.handle.take_message, subscription.msg_type, True)
                 for data in _taken(receive):
                     self.topic_rows.take_encoded(name, data, now)
-
-        with self._asked.handle:
-            _, answer = self._asked.handle.take_response(Trigger.Response)
-        if answer is not None:
-            self._take_answer(answer)
 
     def now(self) -> float:
         """Return the time (s) of a clock that only goes forward."""
@@ -78,19 +71,6 @@ class TopicFeed(Feed):
         stamp = store.epoch + round(store.newest * SECOND)
         message.stamp.sec, message.stamp.nanosec = divmod(stamp, SECOND)
         self._events.publish(message)
-
-    def release_alarms(self) -> str:
-        """Ask the node to release alarms that have ended; its answer becomes an event."""
-        if not self._asked.service_is_ready():
-            return "the node is not there to let go of it"
-        with self._asked.handle:
-            self._asked.handle.send_request(Trigger.Request())
-        return "the node was asked to let go of what has ended"
-
-    def _take_answer(self, answer: Any) -> None:
-        if answer.success:
-            self.store.alarms.acknowledge_ended()
-        self.publish(f"{'let go of' if answer.success else 'not let go'} by the node: {answer.message}")
 
     def close(self) -> None:
         """Stop listening."""

@@ -5,24 +5,25 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
-from inspect import Parameter, Signature
-from typing import Any, Self
+from typing import Any
 
 import rclpy
-from rclpy.clock import Clock, ClockType
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.duration import Duration
 from rclpy.exceptions import ROSInterruptException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 
+from ..diagnostics.levels import Level, Status
 from ..errors import UsageError
-from ..messages.topic_table import Qos
+from ..messages.topic_table import Qos, Topic
 from ..system.terminal_text import printable
 
 STOPPED = (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException)
@@ -63,126 +64,6 @@ def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
 def one_line(error: BaseException) -> str:
     """Return the text of an error of rclpy without line breaks and without what its C parts append."""
     return " ".join(re.split(r", at \.?/", str(error))[0].split()).rstrip(".") or type(error).__name__
-
-
-WAKE = 0.2  # time (s) between looks at whether it is over
-LATE = 0.5  # time (s) of work on messages, without a turn of the timers, after which the row of the events executor is too long
-PAUSE = 0.05  # most time (s) between two messages that counts as work on messages: one long callback makes no row
-TURN = 10.0
-"""Time (s) of a turn of the events executor: each leaves 32 bytes behind in rclpy 7.1, half a megabyte in an hour of `WAKE`."""
-
-
-class CallbackTurns:
-    """Turns in which the callbacks of `node` run: until `is_due`, which is asked every `WAKE` s, or until `end`.
-
-    The events executor takes half the processor time, but it is experimental. Its ``spin`` does not return, with a finite wait
-    neither as long as messages come, so a timer ends every turn. It keeps one row of events for messages, services and timers.
-    In a flood of messages that row grows without limit. It is then dropped, see `_drop_row`. Where the events executor is
-    missing or fails, the single-threaded executor goes on. Its turns are at most one callback long.
-    """
-
-    def __init__(self, node: Node, is_due: Callable[[], bool]) -> None:
-        self._node, self._is_due = node, is_due
-        self._turn, self._last = Future(), 0.0
-        self._worked, self._newest = 0.0, time.monotonic()
-        self._executors: list[Callable[[], Any]] = [
-            lambda: import_module("rclpy.experimental").EventsExecutor(),
-            SingleThreadedExecutor,
-        ]
-        self._executor: Any = None
-
-    def __enter__(self) -> Self:
-        self._timer = self._node.create_timer(WAKE, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._release()
-        self._node.destroy_timer(self._timer)
-
-    def is_flooded(self) -> bool:
-        """Return True if messages keep timers and services from their turn; ask at every message."""
-        now = time.monotonic()
-        self._worked, self._newest = self._worked + min(now - self._newest, PAUSE), now
-        return self._worked > LATE
-
-    def run(self) -> None:
-        """Run one turn, of `TURN` s at most."""
-        self._turn, self._last = Future(), time.monotonic() + TURN
-        self._call_back(is_whole=True)
-
-    def poll(self) -> None:
-        """Run the next callback that waits, if one does."""
-        self._call_back(is_whole=False)
-
-    def end(self) -> None:
-        """End the turn that runs."""
-        if not self._turn.done():
-            self._turn.set_result(None)
-
-    def _look(self) -> None:
-        self._worked = 0.0
-        if self._is_due() or time.monotonic() >= self._last:
-            self.end()
-
-    def _call_back(self, is_whole: bool) -> None:
-        try:
-            if self.is_flooded() and len(self._executors) > 1:
-                self._drop_row()
-            if self._executor is None:
-                self._executor = self._executors[0]()
-                self._executor.add_node(self._node)
-            if is_whole and len(self._executors) > 1:
-                self._executor.spin_until_future_complete(self._turn, timeout_sec=TURN)
-            else:
-                self._executor.spin_once(timeout_sec=WAKE if is_whole else 0.0)
-        except STOPPED:
-            raise
-        except Exception as error:
-            if len(self._executors) == 1:
-                raise
-            told = f"events executor: {one_line(error)}; the single-threaded executor goes on, at twice the processor time"
-            Log(self._node).warning(told)
-            self._release()
-            del self._executors[0]
-
-    def _drop_row(self) -> None:
-        """Give up the events executor and its row.
-
-        A new one hears only of what arrives from now on. So the single-threaded executor takes all that waits before.
-        """
-        self._release()
-        depths = [each.qos_profile.depth for each in self._node.subscriptions]
-        interim, left = SingleThreadedExecutor(), sum(depths) + 2 * max(depths, default=0)  # twice for the timers between
-        interim.add_node(self._node)
-        while left > 0 and not self._is_due():
-            interim.spin_once(timeout_sec=0.0)
-            left -= 1
-        interim.remove_node(self._node)
-        self._worked = 0.0
-
-    def _release(self) -> None:
-        if self._executor is not None:
-            self._executor.remove_node(self._node)
-        self._executor = None
-
-
-_BOTH = Signature([Parameter(name, Parameter.POSITIONAL_ONLY) for name in ("data", "info")])
-
-
-def with_information(take: Callable[[bytes, Mapping[str, Any]], None]) -> Callable[..., None]:
-    """Wrap `take` for ``create_subscription(.., raw=True)``, so that it gets a message's information too.
-
-    rclpy tells by the signature that the information is wanted; its events executor (7.1) then gives the two as one argument.
-    `take` is given the encoded message and its information: ``received_timestamp``, ``source_timestamp`` (ns) and
-    ``publication_sequence_number``.
-    """
-
-    def put(*received: Any) -> None:
-        data, info = received if len(received) == 2 else received[0]
-        take(data, info)
-
-    put.__signature__ = _BOTH  # type: ignore[attr-defined]
-    return put
 
 
 class Log:
@@ -229,3 +110,71 @@ def node_name(endpoint: Any) -> str:
     if "UNKNOWN" in endpoint.node_name:  # so rmw calls a node that it has not heard of
         return "a node without a known name"
     return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
+
+
+MOST_LINES, LINES_SPAN = 4, 600.0
+"""Changes of a component to a warning and back that are logged within so many seconds: on a busy computer they come and go."""
+
+
+class DiagnosticsPublisher:
+    """Publisher of the states of one node. `hardware_id` names what is diagnosed; empty: the node's name."""
+
+    def __init__(self, node: Node, topic: Topic, hardware_id: str = "") -> None:
+        self._node, self._logger = node, Log(node)
+        self._name = node.get_fully_qualified_name().lstrip("/")
+        self._hardware_id = hardware_id or self._name
+        self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
+        self._levels: dict[str, Level] = {}
+        self._logged: dict[str, deque[float]] = {}
+
+    def show(self, statuses: Sequence[Status]) -> None:
+        """Publish all statuses; log in one line those whose level differs from the logged one, which is OK for a new status."""
+        before = {status.name: self._levels.get(status.name, Level.OK) for status in statuses}
+        changed = [status for status in statuses if before[status.name] != status.level and self._is_due(status)]
+        self._levels = before | {status.name: status.level for status in changed}
+        self._log(changed)
+        message = DiagnosticArray(status=[self._message(status) for status in statuses])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+    def settle(self) -> None:
+        """Wait until subscribers have received everything, at most a second."""
+        self._publisher.wait_for_all_acked(Duration(seconds=1))
+
+    def _is_due(self, status: Status) -> bool:
+        """Return True if a change of level is logged now.
+
+        An error and its end are always logged. Other changes of a component are limited in rate.
+        """
+        if max(status.level, self._levels.get(status.name, Level.OK)) > Level.WARN:
+            return True
+        now, times = time.monotonic(), self._logged.setdefault(status.name, deque(maxlen=MOST_LINES))
+        if len(times) == MOST_LINES and now - times[0] < LINES_SPAN:
+            return False
+        times.append(now)
+        return True
+
+    def _log(self, changed: Sequence[Status]) -> None:
+        """Log the changed statuses, those with one message together: the sensors of a topic fall silent as one."""
+        groups: dict[str, list[str]] = {}
+        for status in changed:
+            groups.setdefault(status.message, []).append(status.name)
+        text = "; ".join(f"{', '.join(names)}: {message}" for message, names in groups.items())
+        if any(status.level != Level.OK for status in changed):
+            self._logger.warning(text)
+        elif changed:
+            self._logger.info(text)
+
+    def _message(self, status: Status) -> DiagnosticStatus:
+        return DiagnosticStatus(
+            name=f"{self._name}: {status.name}",
+            level=bytes([status.level]),
+            message=_text(status.message),
+            hardware_id=self._hardware_id,
+            values=[KeyValue(key=key, value=_text(value)) for key, value in status.values.items()],
+        )
+
+
+def _text(value: str | int | float) -> str:
+    """Return a value as text for a program: a float with nine digits, a text with control characters escaped, as in the log."""
+    return f"{value:.9g}" if isinstance(value, float) else printable(str(value), keep="")

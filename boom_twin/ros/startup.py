@@ -12,7 +12,7 @@ from importlib.util import find_spec
 from types import FrameType
 
 from ..errors import UsageError
-from ..system.child_process import python_command
+from ..system.processes import python_command
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Signals that end a process. A closed terminal sends SIGHUP; ``nohup`` ignores it."""
@@ -36,45 +36,6 @@ def on_stop_signal(act: Callable[[], None]) -> None:
 
     for each in stop_signals():
         signal.signal(each, stop)
-
-
-class InterruptedWorkError(KeyboardInterrupt):
-    """Interruption of work that took too long to end by itself.
-
-    It is a subclass because a plain KeyboardInterrupt inside ``exec`` (dataclasses use it) ends the process as killed by
-    SIGINT, even if it is caught.
-    """
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    sys.unraisablehook = _nothing  # finalisers of half-made objects would print errors
-    raise InterruptedWorkError
-
-
-def _nothing(unraisable: object) -> None:
-    """Report nothing."""
-
-
-class StopSignal:
-    """Stop request by one of `STOPS`: checked between callbacks; KeyboardInterrupt if a callback takes too long.
-
-    rclpy reports an exception inside a callback as a fault of the callback. Use this only in a process without unsaved data.
-    """
-
-    LONGEST = 0.5  # time (s) allowed to a callback before it is interrupted
-
-    def __init__(self) -> None:
-        self.asked = False  # True after a signal
-        on_stop_signal(self._ask)
-
-    def _ask(self) -> None:
-        self.asked = True
-        signal.signal(signal.SIGALRM, _interrupt)
-        signal.setitimer(signal.ITIMER_REAL, self.LONGEST)
-
-    def over(self) -> None:
-        """Interrupt nothing from now on, because the process is ending."""
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 def end_with_preparation(code: int) -> int:

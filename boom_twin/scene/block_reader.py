@@ -9,10 +9,9 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from decimal import Decimal
 from functools import cache
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -30,30 +29,18 @@ NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 LONGEST_NUMBER, LONGEST_WITH_UNIT = 40, 60  # characters of a text that may be a misspelt number, a number with its unit
 
 
-@dataclass(frozen=True)
-class Validated(Generic[Root]):
-    """Validated content of a document, or the faults of its values."""
+def validated(document: Document, root: type[Root]) -> tuple[Root | None, list[Fault]]:
+    """Return the document as a block of type `root`, and the faults of single values and unknown keys.
 
-    block: Root | None
-    """The validated document; None if any single value is faulty."""
-    known: Any
-    """Plain values without unknown and empty keys."""
-    broken: frozenset[Place]
-    """Places of faulty values."""
-    faults: tuple[Fault, ...]
-    """Faults of single values and unknown keys."""
-
-
-def validated(document: Document, root: type[Root]) -> Validated[Root]:
-    """Return the document as a block of type `root`, with all faults of single values."""
+    The block is None if any single value is faulty; unknown keys are left out.
+    """
     faults: list[Fault] = []
     known = _known(document, root, document.values, root, (), faults)
     try:
-        return Validated(root.model_validate(known, strict=True), known, frozenset(), tuple(faults))
+        return root.model_validate(known, strict=True), faults
     except ValidationError as error:
         details = [each for each in error.errors(include_url=False) if not _counts_faulty(each)]
-    faults += [_value_fault(document, root, detail) for detail in details]
-    return Validated(None, known, frozenset(detail["loc"] for detail in details), tuple(faults))
+    return None, faults + [_value_fault(document, root, detail) for detail in details]
 
 
 def _counts_faulty(detail: ErrorDetails) -> bool:

@@ -1,17 +1,14 @@
-"""The table of a boom's drawing: boxes, bores and rods, pins, kinds of joints; read from YAML or CSV."""
+"""The table of a boom's drawing: boxes, bores and rods, pins, kinds of joints."""
 
 from __future__ import annotations
 
-import csv
-import re
 from pathlib import Path
-from typing import Any
 
 from pydantic import Field
 
-from ..config.yaml_text import Document, Place
+from ..config.yaml_text import Document
 from ..errors import ABSENT, Fault, SceneError
-from .block_reader import NUMBER, meaning_of, validated
+from .block_reader import meaning_of, validated
 from .load import Kind, parse, read_text
 from .schema import (
     CAP_LINE,
@@ -81,36 +78,26 @@ class BoomTable(Part):
     postures: dict[str, tuple[Finite, ...]] = Field(default={}, description=meaning_of(Scene, "postures"))
 
 
-PAIRS = {"x": 0, "y": 1, "start": 0, "end": 1, "low": 0, "high": 1, "along": 0, "left": 1}
-"""Ending of the name of a column that holds one of two numbers, as in C_x, beam_end, range_deg_low."""
-TABLES = (".csv", ".tsv", ".txt")
-"""Names of files with a row for every section end so; the cells lie apart by commas, semicolons or tabs."""
 TABLE_FILE = Kind("table", "boom_twin init --example-table")
-_HEADER = re.compile(r"(\w+?)(?:_(x|y|start|end|low|high|along|left))?\s*(?:[\[(]\s*(.+?)\s*[\])])?")
 
 
 def read_table(path: Path) -> tuple[BoomTable, Document]:
-    """Return the table in a file (.csv, .tsv, .txt, else YAML), and the document with the lines of its values.
+    """Return the table in a YAML file, and the document with the lines of its values.
 
     SceneError with every fault that was found: place, value, bound, remedy.
     """
-    text = read_text(path, TABLE_FILE)
-    document = csv_document(text, str(path)) if path.suffix.lower() in TABLES else parse(text, str(path), TABLE_FILE)
-    return checked_table(document, str(path)), document
-
-
-def checked_table(document: Document, source: str) -> BoomTable:
-    """Return the table that a document holds; SceneError with all its faults."""
+    source = str(path)
+    document = parse(read_text(path, TABLE_FILE), source, TABLE_FILE)
     if isinstance(document.values, dict) and "gravity" in document.values:
         bound, remedy = "only a scene has it, and this is to be a table of dimensions", "`boom_twin check` takes a scene."
         raise SceneError(source, (document.fault(("gravity",), document.values["gravity"], bound, remedy),))
-    read = validated(document, BoomTable)
-    faults = [*read.faults, *document.faults]
-    if read.block is not None:
-        faults += _faults(document, read.block)
-    if faults or read.block is None:
+    table, faults = validated(document, BoomTable)
+    faults += document.faults
+    if table is not None:
+        faults += _faults(document, table)
+    if faults or table is None:
         raise SceneError(source, tuple(sorted(faults, key=lambda fault: fault.line or 0)))
-    return read.block
+    return table, document
 
 
 def _faults(document: Document, table: BoomTable) -> list[Fault]:
@@ -150,7 +137,7 @@ def _angle_without_unit(document: Document) -> list[Fault]:
     value = base.get("inclination") if isinstance(base, dict) else None
     if not isinstance(value, int | float) or value == 0:
         return []
-    remedy = f"Give its unit: {value:g} deg or {value:g} rad (in a CSV table in the heading: `inclination [deg]`)."
+    remedy = f"Give its unit: {value:g} deg or {value:g} rad ."
     return [document.fault(("base", "inclination"), value, "rad or degrees?", remedy)]
 
 
@@ -179,97 +166,3 @@ def odd_boxes(table: BoomTable, document: Document) -> list[Fault]:
 def second_moment(height: float, width: float, wall: float) -> float:
     """Return I (m^4) of a box about the axis across the plane of the boom."""
     return (width * height**3 - (width - 2 * wall) * (height - 2 * wall) ** 3) / 12
-
-
-def csv_document(text: str, source: str) -> Document:
-    """Return a CSV text as the values of a table: a header, then a row for every section with its joint.
-
-    A column is named as the key in the YAML table, with ``_x``, ``_y`` and the like (`PAIRS`) for one of two numbers, and may
-    name a unit: ``length [mm]``. Columns of the base and of the whole boom have one value, in the first row or the same in all;
-    a pipe in the first row alone is that of the whole boom. Without columns of the pivot, the pin of section 1 is the origin.
-    """
-    document = Document({"sections": [], "joints": [], "base": {}})
-    try:
-        header = text.partition("\n")[0]
-        rows = list(csv.reader(text.splitlines(), delimiter=next((mark for mark in ";\t" if mark in header), ",")))
-    except csv.Error as error:
-        raise SceneError(source, (Fault("table", source, f"not a readable CSV file ({error})", "Export it again."),)) from None
-    if len(rows) < 2:
-        raise SceneError(source, (Fault("table", source, "no row under the header", "Give a row for every section."),))
-    used = min(len(rows[0]), max(map(len, rows[1:])))  # a header may end with an empty cell
-    columns = [_column(rows[0], number, source) for number in range(used)]
-    filled = [(line, row) for line, row in enumerate(rows[1:], 2) if any(cell.strip() for cell in row)]
-    for i, (line, row) in enumerate(filled):
-        document.values["sections"].append({})
-        document.values["joints"].append({})
-        for number, ((key, end, unit), cell) in enumerate(zip(columns, map(str.strip, row), strict=False)):
-            others = [other[number].strip() for _, other in filled if number < len(other)]
-            home = "" if key == "pipe" and not any(others[1:]) else HOMES[key]
-            if home in ("", "base") and i > 0:
-                if cell not in ("", others[0]):
-                    where, bound = f"{rows[0][number]}, {_letters(number)}{line}", f"the first row has {others[0] or 'none'}"
-                    remedy = "It belongs to the whole boom: give it in the first row only, or the same in all."
-                    raise SceneError(source, (Fault(where, cell, bound, remedy, line),))
-            elif cell:
-                place: Place = () if not home else ("base",) if home == "base" else (home, i)
-                place = (*place, key) if end is None else (*place, key, PAIRS[end])
-                _put(document, place, _value(cell, unit), line)
-                document.cells[place] = f"{_letters(number)}{line}"
-    document.values["base"].setdefault("pivot", [0.0, 0.0])  # without such columns, the origin is there
-    document.values = frozen(document.values)
-    return document
-
-
-HOMES = {
-    **dict.fromkeys(Base.model_fields, "base"),
-    **dict.fromkeys(DrawnJoint.model_fields, "joints"),
-    **dict.fromkeys(BoxSection.model_fields, "sections"),
-    **dict.fromkeys(("description", "bulk_modulus", "damping_ratio", "payload", "line_fill"), ""),
-}
-"""Keys that a column may be named after, with the block that has them."""
-
-
-def _column(names: list[str], number: int, source: str) -> tuple[str, str | None, str | None]:
-    """Return key, ending and unit of a column. Raise SceneError if there is no such key, or an earlier column has the name."""
-    columns = [_HEADER.fullmatch(name.strip()) for name in names[: number + 1]]
-    column, name = columns[-1], names[number].strip()
-    if column is None or column[1] not in HOMES:
-        known = f"Known are {', '.join(sorted(HOMES))}."
-        raise SceneError(source, (Fault("header", name, "no such column", known, 1),))
-    before = next(i for i, other in enumerate(columns) if other and other.group(1, 2) == column.group(1, 2))
-    if before < number:
-        bound = f"columns {_letters(before)} and {_letters(number)} have the same name"
-        raise SceneError(source, (Fault("header", name, bound, "Correct one, or remove it.", 1),))
-    return column[1], column[2], column[3]
-
-
-def _letters(column: int) -> str:
-    """Return the spreadsheet name of a column, counted from 0: A to Z, AA, .."""
-    return (_letters(column // 26 - 1) if column > 25 else "") + chr(ord("A") + column % 26)
-
-
-def _value(cell: str, unit: str | None) -> Any:
-    if NUMBER.fullmatch(cell):
-        return float(cell) if unit is None else f"{cell} {unit}"
-    return cell
-
-
-def _put(document: Document, place: Place, value: Any, line: int) -> None:
-    block: Any = document.values
-    is_half = isinstance(place[-1], int)
-    for step in place[:-2] if is_half else place[:-1]:
-        block = block[step]
-    if is_half:
-        if not isinstance(block.get(place[-2]), list):
-            block[place[-2]] = [None, None]
-        block = block[place[-2]]
-    block[place[-1]] = value
-    for depth in range(1, len(place) + 1):
-        document.lines.setdefault(place[:depth], line)
-
-
-def frozen(value: Any) -> Any:
-    """Return a value with tuples for its lists, as the reader of YAML gives them."""
-    if isinstance(value, dict):
-        return {key: frozen(item) for key, item in value.items()}
-    return tuple(map(frozen, value)) if isinstance(value, list) else value

@@ -18,9 +18,10 @@ from typing import Any, TypeVar, cast
 from pydantic import BaseModel
 from ruamel.yaml.error import YAMLError
 
-from ..config.yaml_text import Place, with_value, words, yaml_text
+from ..config.yaml_text import Place, with_values, words, yaml_text
 from ..errors import SceneError, UsageError
-from .load import examine_text, parse, structure, text_of
+from .block_reader import validated
+from .load import examine_text, parse, text_of
 from .oil_spring import middle_stiffness
 from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
 
@@ -156,9 +157,8 @@ def rewritten(text: str, scene: Scene, wanted: Scene) -> str:
     Blocks that share their text (YAML aliases) cannot be changed apart: then all of it is written anew, without comments.
     """
     try:
-        for place, value in _changes(scene.model_dump(), wanted.model_dump(), ()):
-            text = with_value(text, place, value)
-        found, _, faults = structure(parse(text, "changed scene"))
+        text = with_values(text, _changes(scene.model_dump(), wanted.model_dump(), ()))
+        found, faults = validated(parse(text, "changed scene"), Scene)
     except (YAMLError, SceneError):
         return anew(wanted)
     same = found is not None and not faults and _same(found.model_dump(), wanted.model_dump())

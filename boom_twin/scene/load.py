@@ -20,8 +20,8 @@ from ruamel.yaml.nodes import ScalarNode
 
 from ..config.yaml_text import Document, Place, YamlReader, whole_text
 from ..errors import Fault, SceneError, SceneWarning, UsageError
-from .block_reader import NUMBER, inner_block, validated
-from .checks import Draft, Findings, geometry, linkages, sizes, values, whole_boom
+from .block_reader import NUMBER, validated
+from .checks import Draft, Findings, geometry, sizes, values, whole_boom
 from .schema import Scene
 
 MAX_BYTES = 4_000_000
@@ -49,7 +49,9 @@ def read_text(path: Path, kind: Kind = SCENE) -> str:
         return data.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         if isinstance(error, UnicodeDecodeError):
-            raise _refusal(kind, str(path), *_not_utf8(data, error)) from None
+            line = data[: error.start].count(b"\n") + 1
+            bound = f"line {line} has bytes that are no text in UTF-8"
+            raise _refusal(kind, str(path), bound, "Give a text file in YAML, saved with the encoding UTF-8.") from None
         reason = getattr(error, "strerror", None) or str(error)
         remedy = f"Give the path of a {kind.name} file; `{kind.example}` prints one to start from."
         raise _refusal(kind, str(path), reason, remedy) from None
@@ -67,19 +69,6 @@ def parse(text: str, source: str, kind: Kind = SCENE) -> Document:
     if reader.is_empty:
         raise _refusal(kind, source, "the file is empty", f"Start from the one that `{kind.example}` prints.")
     return reader.document
-
-
-def _not_utf8(data: bytes, error: UnicodeDecodeError) -> tuple[str, str]:
-    """Return what a file is instead of UTF-8 text, and the remedy."""
-    if data.startswith((b"PK", b"\xd0\xcf\x11\xe0")):  # zip, as .xlsx and .ods; .xls
-        return "this is not a text file but a spreadsheet's own or an archive", "Save a spreadsheet as `CSV UTF-8`."
-    if b"\0" in data:
-        return "this is not a text file in UTF-8", "Give a scene or a table in YAML, or a table in CSV."
-    line = data.count(b"\n", 0, error.start) + 1
-    return (
-        f"line {line} has a character that is not UTF-8, byte {data[error.start]:#x}",
-        "Save the file with the encoding UTF-8.",
-    )
 
 
 def _refusal(kind: Kind, source: str, bound: str, remedy: str) -> SceneError:
@@ -169,54 +158,23 @@ def missing_end_mark(text: str) -> Fault | None:
 # -- values and checks ---------------------------------------------------------------------------------------------------
 
 
-def structure(document: Document) -> tuple[Scene | None, Draft, list[Fault]]:
-    """Return the scene (None if a value is not good by itself), what is usable of it, and all faults of single values."""
-    read = validated(document, Scene)
-    deep = (("sections",), ("joints",), ("postures",))
-    broken = {place[:2] if place[:1] in deep else place[:1] for place in read.broken}
-    return read.block, _draft(document, read.known, broken), list(read.faults)
-
-
-def _draft(document: Document, known: Any, broken: set[Place]) -> Draft:
-    """Return the usable parts of `known`: everything that is neither in `broken` nor inside it."""
-    if not isinstance(known, dict):
-        return Draft(document)
-    usable = {key: value for key, value in known.items() if (key,) not in broken}
-    blocks: dict[str, Any] = {}
-    for key, value in usable.items():
-        model = inner_block(Scene, key)
-        if key in ("sections", "joints") and model is not None:
-            items = enumerate(value)
-            blocks[key] = tuple(None if (key, i) in broken else model.model_validate(v, strict=True) for i, v in items)
-        elif key == "postures":
-            blocks[key] = {name: angles for name, angles in value.items() if (key, name) not in broken}
-        elif key != "description":
-            blocks[key] = value if model is None else model.model_validate(value, strict=True)
-    return Draft(document, **blocks)
-
-
-CHECKS: tuple[Callable[[Draft], Findings], ...] = (
-    values.counts,
-    values.base,
-    values.sections,
+Check = Callable[[Draft], Findings]
+CONSISTENCY: tuple[Check, ...] = (values.counts, values.base, values.sections, values.joints)
+"""Keys that need or exclude each other. A scene with such a fault has no geometry to check."""
+CHECKS: tuple[Check, ...] = (
     values.modes,
-    values.joints,
+    values.worn_pins,
     geometry.placed_pins,
     geometry.thin_parts,
-    geometry.centres,
-    values.worn_pins,
     geometry.joints,
     sizes.suspects,
 )
-
-
-PLAUSIBILITY: tuple[Callable[[Draft, Scene], Findings], ...] = (
+PLAUSIBILITY: tuple[Check, ...] = (
     sizes.material,
     sizes.beams,
     sizes.rigid_parts,
     sizes.moving_parts,
-    linkages.clear_cylinders,
-    linkages.spaced_pins,
+    geometry.clear_cylinders,
 )
 """Of a scene without faults: parts against each other."""
 
@@ -306,27 +264,37 @@ def examine_text(text: str, name: str, whole: bool = False) -> tuple[Scene, list
     if mark is not None and mark.kind == "fault":
         raise SceneError(name, (mark,))
     document = parse(text, name)
-    scene, draft, faults = structure(document)
-    with np.errstate(all="ignore"):  # what overflows fits nowhere, and the checks say so
-        findings = [finding for check in CHECKS for finding in check(draft)]
-        if scene is not None and not faults and all(finding.kind != "fault" for finding in findings):
-            findings += _implausible(draft, scene, findings)
-    findings = sorted([*faults, *document.faults, *findings, *filter(None, [mark])], key=lambda finding: finding.line or 0)
+    scene, findings = validated(document, Scene)
+    findings += [*document.faults, *filter(None, [mark])]
+    if scene is not None:
+        with np.errstate(all="ignore"):  # what overflows fits nowhere, and the checks say so
+            findings += _checked(Draft(document, scene))
+    findings.sort(key=lambda finding: finding.line or 0)
     oddities = [finding for finding in findings if finding.kind != "fault"]
     if scene is None or len(oddities) < len(findings):
         raise SceneError(name, tuple(finding for finding in findings if finding.kind == "fault"), tuple(oddities))
     return scene, oddities
 
 
-def _implausible(draft: Draft, scene: Scene, findings: list[Fault]) -> list[Fault]:
-    """Return warnings of values that do not fit together: one at a key, none for a block that has a finding already."""
+def _checked(draft: Draft) -> list[Fault]:
+    """Return what the checks find; of values that do not fit together one at a key, none for a block with a finding."""
+    found = [finding for check in CONSISTENCY for finding in check(draft)]
+    if _is_faulty(found):
+        return found
+    found += [finding for check in CHECKS for finding in check(draft)]
+    if _is_faulty(found):
+        return found
     more: dict[str, Fault] = {}
     for check in PLAUSIBILITY:
-        told = {_block(finding) for finding in (*findings, *more.values())}
-        for finding in check(draft, scene):
+        told = {_block(finding) for finding in (*found, *more.values())}
+        for finding in check(draft):
             if _block(finding) not in told:
                 more.setdefault(finding.path, finding)
-    return [*more.values(), *whole_boom.whole_boom(draft, scene, [*(finding.path for finding in findings), *more])]
+    return [*found, *more.values(), *whole_boom.whole_boom(draft, [*(finding.path for finding in found), *more])]
+
+
+def _is_faulty(findings: list[Fault]) -> bool:
+    return any(finding.kind == "fault" for finding in findings)
 
 
 def _block(finding: Fault) -> str:

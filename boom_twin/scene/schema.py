@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..kernels.elements.pin_contact import LAWS, restitution_of
-from ..system.summary_display import SummaryDisplay, numbers
+from ..system.result_text import SummaryDisplay, numbers
 
 LARGEST_VALUE = 1e30  # of any value, in its unit; products of larger ones leave the range of numbers
 Finite = Annotated[float, Field(ge=-LARGEST_VALUE, le=LARGEST_VALUE, allow_inf_nan=False)]
@@ -304,7 +304,7 @@ class Scene(SummaryDisplay, Part):
         return changed(self, {**(changes or {}), **named})
 
     def summary_rows(self) -> dict[str, str]:
-        """See `boom_twin.system.summary_display.SummaryDisplay`."""
+        """See `boom_twin.system.result_text.SummaryDisplay`."""
         return {
             "sections": f"{len(self.sections)}, {numbers([section.length for section in self.sections])} m",
             "joints": " + ".join(joint.kind for joint in self.joints),

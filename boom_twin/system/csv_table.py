@@ -37,28 +37,26 @@ class CsvTable:
     error: type[BoomTwinError]  # type of the errors that are raised
     is_ended: bool = True  # False if the last row is the last of the file, and has no line end
 
-    def column(self, name: str, blank: float | None = None) -> list[float]:
-        """Return the numbers of a column, with `blank` for an empty cell. Without `blank`, an empty cell raises `error`."""
+    def column(self, name: str) -> list[float]:
+        """Return the numbers of a column."""
         place = self.names.index(name)
-        return [self._number(row, place, line, blank) for row, line in zip(self.rows, self.lines, strict=True)]
+        return [self._number(row, place, line) for row, line in zip(self.rows, self.lines, strict=True)]
 
-    def require(self, names: Sequence[str], also: str = "") -> None:
-        """Raise `error`, with another remedy in `also`, unless the header has all `names`."""
+    def require(self, names: Sequence[str]) -> None:
+        """Raise `error` unless the header has all `names`."""
         if missing := [name for name in names if name not in self.names]:
             raise self.error(
                 f"{self.path}: no column {', '.join(missing)} in its first line. It needs {','.join(names)}, "
-                f"with commas between the columns and points in the numbers.{also}"
+                f"with commas between the columns and points in the numbers."
             )
 
-    def _number(self, row: list[str], place: int, line: int, blank: float | None) -> float:
+    def _number(self, row: list[str], place: int, line: int) -> float:
         if place >= len(row):
             raise self.error(
                 f"{self.path}, line {line}: {len(row)} of {len(self.names)} cells, {self.names[place]} is missing. "
                 "If the file was cut off there, remove the line."
             )
         text = row[place].strip()
-        if blank is not None and text.lower() in NOTHING:
-            return blank
         try:
             return float(text)
         except ValueError:

@@ -63,9 +63,6 @@ RIG = ResultKind("rig", _SESSION, is_replaced=False)
 IMPORT = ResultKind("import", _SESSION, is_replaced=False)
 RECOVER = ResultKind("recover", _SESSION, is_replaced=False)
 ENVELOPE = ResultKind("envelope", ("envelope.csv", "envelope.json", "envelope.png"), is_replaced=True)
-COMPARE = ResultKind(
-    "compare", ("compare.png", *(f"{side}/{name}" for side in "AB" for name in REPLAY.files)), is_replaced=True
-)
 MODAL = ResultKind("modal", ("modes.json", "rest_*.png"), is_replaced=True)
 RESPONSE = ResultKind("response", ("response.*", "steady_state.*", "resonance_map.*"), is_replaced=True)
 

@@ -1,18 +1,52 @@
-"""Adjustments of a running twin: sensor zeros, the residuals they are found from, requests of load, limits and restarts."""
+"""Changes of a running twin: sensor zeros, the residuals they are found from, requests, and limits."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 
+from ..analysis.doubts import VALID_DEFLECTION
 from ..config.settings import Settings
+from ..deviation.predictor import BoomPredictor
 from ..errors import UsageError
-from ..types import SECOND, SENSORS, Array, Change, Stream
+from ..scene.schema import Scene
+from ..types import GIVE, NANO, SECOND, SENSORS, Array, Change, Stream, StrokeReading
 from .blocks import CODES
-from .loaded_model import LoadedModel
-from .state import COUNT, FIRST, NONE, ZEROS, Ring, TwinState, zeros_at
+from .state import COUNT, FIRST, NOISE_REACH, NONE, ZEROS, Limits, Ring, TwinState, zeros_at
+
+SWAY = 0.5  # rad, by which an inclinometer that drives the model may be off its estimate at once while its section shakes
+
+
+def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Collection[str], reads: StrokeReading) -> Limits:
+    """Return the limits of the compiled update for `boom`, that of `scene`, and for its sensors."""
+    channels = list(boom.channels.values())
+    counts = np.array([len(names) for names in channels])
+    far = NOISE_REACH * settings.variance(SENSORS[reads.stream]) ** 0.5
+    low, high = np.zeros(boom.plan.joints), np.array([joint.cylinder.max_stroke for joint in scene.joints])
+    absolute = boom.posture.absolute
+    if reads is StrokeReading.ANGLE:
+        far += SWAY * boom.posture.sways.any()
+        low, high = np.radians([joint.range_deg for joint in scene.joints]).T
+        low, high = np.where(absolute, -np.inf, low - GIVE), np.where(absolute, np.inf, high + GIVE)
+        counts[CODES[Stream.STROKES]] = 0
+    return Limits(
+        gap=round(settings.gap * SECOND),
+        leap=settings.leap / NANO,
+        drive=CODES[reads.stream],
+        far=far,
+        rate=settings.rate(reads),
+        shortest=low - far,
+        longest=high + far,
+        turns=absolute & (reads is StrokeReading.ANGLE),
+        valid=VALID_DEFLECTION * scene.reach,
+        gravity=np.array(boom.plan.tables.gravity),
+        absolute=absolute,
+        absent=np.array([name in absent for names in channels[1:] for name in names]),
+        first=np.concatenate([[0], np.cumsum(counts[1:]) - counts[1:]]),
+        channels=counts,
+    )
 
 
 class SensorZeros:
@@ -99,19 +133,18 @@ class ResidualBuffer:
 class Requests:
     """Collector of the changes requested between two stroke samples; `due` if anything waits.
 
-    `settings` and `zeros` are as they will be, `model` that of these settings if it was made in advance. `from_rest` asks for
-    a start from rest, `is_new` for a twin that knows nothing of the samples before.
+    `settings` and `zeros` are as they will be. `from_rest` asks for a start from rest, `is_new` for a twin that knows nothing
+    of the samples before.
     """
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.zeros: dict[str, float] = {}
         self.from_rest = self.is_new = self.due = False
-        self.model: LoadedModel | None = None
 
-    def tune(self, live: Mapping[str, float], model: LoadedModel | None = None) -> None:
+    def tune(self, live: Mapping[str, float]) -> None:
         """Request new live settings; UsageError if a value is out of bounds or cannot change while the twin runs."""
-        self.settings, self.model, self.due = self.settings.tuned(live), model, True
+        self.settings, self.due = self.settings.tuned(live), True
 
     def zero(self, values: Mapping[str, float]) -> None:
         """Request new zeros of some sensors."""
@@ -128,5 +161,5 @@ class Requests:
 
     def take(self) -> bool:
         """Clear all requests; return True if a restart from static equilibrium was requested."""
-        from_rest, self.from_rest, self.is_new, self.due, self.model = self.from_rest, False, False, False, None
+        from_rest, self.from_rest, self.is_new, self.due = self.from_rest, False, False, False
         return from_rest

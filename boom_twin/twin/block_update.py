@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..deviation.predictor import BoomPredictor, Drawn
 from ..health.blocks import MeasuredRows, PredictionRows
@@ -18,63 +16,31 @@ from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..predictions import Outline
 from ..types import Health, Report, Residuals, Stream
-from .blocks import CODES, STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
+from .blocks import (
+    CODES,
+    STREAMS,
+    EstimateBlock,
+    Integers,
+    Note,
+    PredictionBlock,
+    ReportBlock,
+    ResidualBlock,
+    SampleBlock,
+    estimate_of,
+)
 from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, ROOM, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .update import DONE, LOOK, update
 
-
-@dataclass
-class _UpdateExtras:
-    """Results of one call that are not numbers: `drawn` by row of a prediction, `health` and `events` by row of a sample."""
-
-    drawn: dict[int, Drawn] = field(default_factory=dict)
-    health: dict[int, Health] = field(default_factory=dict)
-    events: dict[int, tuple[str, ...]] = field(default_factory=dict)
-
-
-NO_EXTRAS = _UpdateExtras()
 _Code = Callable[..., tuple[int, int]]  # `update`, compiled for a scene's types
 _Held = tuple[_Code, tuple[Any, ...], Any]  # with boom, limits and state, and output, see `boom_twin.kernels.jit.hold`
-
-
-SHAPES_ABOVE, HEALTH_ABOVE = 0.5, 0.75
-"""Share of the queue of samples that is filled, above which shapes and then health too are left out; at 1 samples are lost."""
-
-
-class LoadShedding:
-    """Decision, by the fill level of the sample queue, what to skip: shapes first, then the judgement of health.
-
-    Predictions, estimates and residuals are never skipped, and do not depend on what is. A sensor that fails meanwhile is
-    detected late: until then the estimate still uses it. A replay has no queue and skips nothing. `shapes` and `health` count
-    what was left out.
-    """
-
-    def __init__(self) -> None:
-        self.shapes = self.health = 0
-        self._share = 0.0
-
-    def filled(self, share: float) -> None:
-        """Set the fill level of the queue, 0 to 1, when the next sample is taken."""
-        self._share = share
-
-    def leaves_out_shape(self) -> bool:
-        """Return True if the shape that is due must be skipped; count it."""
-        self.shapes += (is_due := self._share > SHAPES_ABOVE)
-        return is_due
-
-    def leaves_out_health(self) -> bool:
-        """Return True if the judgement of the rig's health that is due must be skipped; count it."""
-        self.health += (is_due := self._share > HEALTH_ABOVE)
-        return is_due
 
 
 class BlockUpdate:
     """Driver of the compiled update, for regular samples.
 
-    `channels`: see `boom_twin.types.channels_of`. ``deflected`` and ``unmatched`` are added to `counts`. `shedding` is asked
-    what is left out. One call takes at most `capacity` samples. `before`, of the same scene under another load, gives its
-    arrays.
+    `channels`: see `boom_twin.types.channels_of`. ``deflected`` and ``unmatched`` are added to `counts`. One call
+    takes at most `capacity` samples.
     """
 
     def __init__(
@@ -85,25 +51,22 @@ class BlockUpdate:
         channels: Mapping[Stream, tuple[str, ...]],
         judge: HealthMonitor | None,
         counts: Counter[str],
-        shedding: LoadShedding,
         capacity: int = ROOM.samples,
-        before: BlockUpdate | None = None,
     ) -> None:
-        self._shedding, self._boom, self.limits, self._state, self._channels = shedding, boom, limits, state, channels
+        self._boom, self.limits, self._state, self._channels = boom, limits, state, channels
         self._judge, self._told_counts = judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
         drives = CODES[Stream.STROKES], limits.drive
         self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code not in drives]
         self._capacity, sizes = capacity, (2 * capacity, self._joints, boom.width, boom.stations, limits.channels)
-        self._found: UpdateOutput = new_output(*sizes) if before is None else before._found
-        self._found.counts[:] = 0
-        self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
+        self._found: UpdateOutput = new_output(*sizes)
+        self._begin, self._told = (0, 0), (0, 0)
+        self._drawn: dict[int, Drawn] = {}  # by row of a prediction
+        self._health: dict[int, Health] = {}  # by row of a sample, as events
+        self._events: dict[int, tuple[str, ...]] = {}
         self._due: Run | None = None  # whose newest slot is still to be judged
         self._begins_health = False  # before it is told anything
         self._held: _Held | None  # what the compiled code takes with every call
-        is_same = before is not None and before._state is state
-        self._kept: tuple[Any, Any] | None = before._kept if before is not None and is_same else None  # state and output, held
-        self._code: _Code | None = before._code if before is not None and is_same else None
 
     @property
     def limits(self) -> Limits:
@@ -121,7 +84,7 @@ class BlockUpdate:
     def advance(self, run: Run | None, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
         """Take regular samples of a block of at most `capacity`; return why that ended, see `DONE`, and how many were taken.
 
-        `run` is the present one. `trusted`: the only sample was looked at before. `reports` or `report` return the results.
+        `run` is the present one. `trusted`: the only sample was looked at before. `rows` or `report` return the results.
         """
         self.judge()
         self.make_room()
@@ -146,18 +109,18 @@ class BlockUpdate:
             self._state.clock[UNMATCHED] = 0
 
     def _hold(self) -> _Held:
-        """Look up the compiled code and prepare the arguments of every call; another load renews few of them."""
-        self._kept = state, found = self._kept or (hold(self._state), hold(self._found))
+        """Look up the compiled code and prepare the arguments of every call."""
+        state, found = hold(self._state), hold(self._found)
         limits, (one, width) = hold(self._limits), (np.zeros(1, np.int64), int(self._limits.channels.max()))
         arguments = *self._boom.held, limits, state
-        if self._code is None:
-            self._code = update.for_types_of(*arguments, one, one, np.zeros((1, width)), 0, False, found)
-        self._held = self._code, arguments, found
+        code = update.for_types_of(*arguments, one, one, np.zeros((1, width)), 0, False, found)
+        self._held = code, arguments, found
         return self._held
 
     def make_room(self) -> None:
         """Prepare the next call of the compiled update; pass pending rows to the health monitor when the buffer is full."""
-        self._begin, self._news = tuple(self._found.counts.tolist()), NO_EXTRAS
+        self._begin = tuple(self._found.counts.tolist())
+        self._drawn, self._health, self._events = {}, {}, {}
         if max(self._begin) > self._capacity:
             self._tell_health()
             self._found.counts[:] = 0
@@ -165,20 +128,17 @@ class BlockUpdate:
 
     def _look_around(self, run: Run | None, row: int) -> None:
         clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
-        if self._news is NO_EXTRAS:
-            self._news = _UpdateExtras()
-        news = self._news
         if clock[IS_DEFLECTED]:
-            news.events[row] = ("deflected",)
+            self._events[row] = ("deflected",)
             self._told_counts["deflected"] += 1
         if not clock[BEGINS_SLOT]:
             return
-        if not self._shedding.leaves_out_shape():
-            news.drawn[at] = self._boom.drawn
-        is_doubtful = bool(clock[IS_DEFLECTED])  # what the model is not valid for accuses no sensor
-        if self._judge is not None and (is_doubtful or self._shedding.leaves_out_health()):
+        self._drawn[at] = self._boom.drawn
+        if self._judge is None:
+            return
+        if clock[IS_DEFLECTED]:  # what the model is not valid for accuses no sensor
             self._told = tuple(self._found.counts.tolist())
-        elif self._judge is not None:
+        else:
             self._due = run
 
     @property
@@ -195,13 +155,13 @@ class BlockUpdate:
         if run is None or self._judge is None:
             return None
         self._tell_health(run.newest // SLOT * SLOT)
-        health = self._judge.judge(run.newest, self._boom.tip_load, lambda: self._boom.tip_sigmas)
+        health = self._judge.judge(run.newest, self._boom.tip_loads, lambda: self._boom.tip_sigmas)
         self._boom.leave_out(self._judge.suspected, self._judge.failing_strokes)
         return health
 
     def _take_judgement(self, row: int) -> None:
         if (health := self.judge()) is not None:
-            self._news.health[row] = health
+            self._health[row] = health
 
     def _tell_health(self, end: float = inf) -> None:
         """Pass the results since the last call to the health monitor, but those from `end` (ns) on."""
@@ -228,12 +188,7 @@ class BlockUpdate:
                 values = (each[rows, :width] for each in (found.raw, found.values, found.sigmas))
                 self._judge.measured(STREAMS[code], MeasuredRows(found.residual_stamps[rows], *values))
 
-    def _residuals(self) -> ResidualBlock:
-        found, own = self._found, slice(self._begin[1], int(self._found.counts[1]))
-        fields = found.residual_at, found.residual_streams, found.residual_stamps, found.values, found.sigmas
-        return ResidualBlock._make(each[own].copy() for each in fields)
-
-    def _predictions(self, own: slice) -> PredictionBlock:
+    def _predictions(self, own: slice, outlines: dict[int, Outline]) -> PredictionBlock:
         found, at = self._found, self._boom.places
         rows = found.rows[own].copy()
         tip = rows[:, at.tip].reshape(-1, 3, 3)
@@ -252,37 +207,50 @@ class BlockUpdate:
             cylinder_forces=rows[:, at.cylinder_forces],
             clearances=rows[:, at.pins].reshape(len(rows), self._pins, PIN),
             moments=found.moments[own].copy(),
-            outlines=self._outlines(),
+            outlines=outlines,
         )
 
+    def _block(self, stamps: Integers, predicted: slice, compared: slice, outlines: dict[int, Outline]) -> ReportBlock:
+        """Return the reports of samples with these stamps (ns) from rows of the results."""
+        found, predictions = self._found, self._predictions(predicted, outlines)
+        columns = found.residual_at, found.residual_streams, found.residual_stamps, found.values, found.sigmas
+        residuals = ResidualBlock._make(each[compared].copy() for each in columns)
+        estimates = EstimateBlock(predictions.stamps, found.estimates[predicted].copy())
+        return ReportBlock(stamps, predictions, estimates, residuals, self._health, {})
+
     def _outlines(self) -> dict[int, Outline]:
-        drawn = self._news.drawn
+        drawn = self._drawn
         return dict(zip(drawn, self._boom.outlines(list(drawn.values())), strict=True)) if drawn else {}
 
-    def reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
-        """Return reports of the samples with these stamps (ns) from the results of the compiled update."""
-        self._take_judgement(len(stamps) - 1)
-        own = slice(self._begin[0], int(self._found.counts[0]))
-        estimates = EstimateBlock(self._found.stamps[own].copy(), self._found.estimates[own].copy())
-        block = ReportBlock(stamps, self._predictions(own), estimates, self._residuals(), self._news.health)
-        if not self._news.events:
-            return [block]
-        reports = enumerate(block.reports(self._joints))
-        return [replace(each, events=self._news.events.get(row, ())) for row, each in reports]
+    def rows(self, stamps: Integers, events: Sequence[str] = (), judged: bool = True) -> ReportBlock:
+        """Return the reports of the samples taken since `make_room`, with these stamps (ns); `events` are of the first.
 
-    def report(self, stamp: int, events: Sequence[str], judged: bool = True) -> Report:
-        """Return the report of one sample, with `events` added; unless `judged`, health is left out, see `judge`."""
-        found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
+        Unless `judged`, the health that is due with the last sample is left out, see `judge`.
+        """
+        if judged:
+            self._take_judgement(len(stamps) - 1)
+        predicted, compared = self._found.counts.tolist()
+        block = self._block(stamps, slice(self._begin[0], predicted), slice(self._begin[1], compared), self._outlines())
+        told = {0: tuple(events)} if events else {}
+        notes = {row: Note(events=told.get(row, ()) + self._events.get(row, ())) for row in sorted(told | self._events)}
+        return block._replace(notes=notes)
+
+    def no_rows(self, stamp: int, note: Note) -> ReportBlock:
+        """Return the report of a sample that gave no numbers."""
+        none = slice(0, 0)
+        return self._block(np.array([stamp]), none, none, {})._replace(health={}, notes={0: note})
+
+    def report(self, stamp: int, judged: bool = True) -> Report:
+        """Return the report of a regular sample, as `rows` does."""
+        found, (predicted, known) = self._found, self._found.counts.tolist()
         residuals = tuple(self._residuals_in(row) for row in range(self._begin[1], known))
         if predicted == self._begin[0]:
-            return Report(stamp, True, residuals=residuals, events=tuple(events))
-        at, outline = predicted - 1, None
-        if news is not NO_EXTRAS:
-            outline, events = self._outlines().get(0), (*events, *news.events.get(0, ()))
-        prediction = self._boom.prediction_in(found.rows[at].copy(), stamp, outline, found.moments[at].copy())
+            return Report(stamp, True, residuals=residuals)
+        at, events = predicted - 1, self._events.get(0, ())
+        prediction = self._predictions(slice(at, predicted), self._outlines()).one(0)
         health = self.judge() if judged else None
         estimate = estimate_of(stamp, found.estimates[at].copy())
-        return Report(stamp, True, prediction, residuals, tuple(events), health=health, estimate=estimate)
+        return Report(stamp, True, prediction, residuals, events, health=health, estimate=estimate)
 
     def _residuals_in(self, row: int) -> Residuals:
         found, stream = self._found, STREAMS[int(self._found.residual_streams[row])]

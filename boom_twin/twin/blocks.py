@@ -5,16 +5,18 @@ The order of the rows is the order in which the samples were taken. Stamps are i
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..deviation import estimate_row as row_at
 from ..predictions import Estimate, Outline, Prediction
-from ..types import Array, Health, Report, Residuals, Sample, Stream, channels_of
+from ..types import Array, Change, Health, Report, Residuals, Sample, Stream, StrokeReading, channels_of
 
 Integers = NDArray[np.int64]
+Item = TypeVar("Item")
 
 STREAMS = tuple(Stream)
 """Streams by code: a block holds the place of a stream in this tuple."""
@@ -28,6 +30,10 @@ class SampleBlock(NamedTuple):
     streams: Integers  # (k,), by `CODES`
     stamps: Integers  # (k,)
     values: Array  # (k, w), see `Sample.values`; w is the largest number of channels of a stream, NaN behind a stream's own
+
+    def part(self, rows: slice) -> SampleBlock:
+        """Return some of the samples, as views."""
+        return SampleBlock(self.streams[rows], self.stamps[rows], self.values[rows])
 
 
 class PredictionBlock(NamedTuple):
@@ -131,11 +137,24 @@ class ResidualBlock(NamedTuple):
     sigmas: Array  # (r, w)
 
 
+class Note(NamedTuple):
+    """What the report of a sample has beside numbers; fields without comment as in `Report`."""
+
+    accepted: bool = True
+    events: tuple[str, ...] = ()
+    status: str = "ok"
+    change: Change | None = None
+    was_held: bool = False  # True if the sample was held before, and had a report then
+
+
+REGULAR = Note()
+
+
 class ReportBlock(NamedTuple):
-    """Reports of accepted samples without events and changes, as arrays.
+    """Reports of samples as arrays.
 
     A bag holds, for each sample in turn, what its `Report` holds, in this order: the prediction (log time: the sample's
-    stamp), the residuals that became known, the health, the outline of the prediction.
+    stamp), the residuals that became known, the change, the health, the outline of the prediction.
     """
 
     stamps: Integers  # (k,), of all samples
@@ -143,6 +162,12 @@ class ReportBlock(NamedTuple):
     estimates: EstimateBlock  # beside the predictions
     residuals: ResidualBlock
     health: dict[int, Health]  # by row of the sample
+    notes: dict[int, Note]  # by row of the sample, in their order; none of a regular sample
+
+    def noted(self, **changes: Any) -> ReportBlock:
+        """Return this block with other fields of the last sample's note."""
+        last = len(self.stamps) - 1
+        return self._replace(notes={**self.notes, last: self.notes.get(last, REGULAR)._replace(**changes)})
 
     def reports(self, joints: int) -> list[Report]:
         """Return one report for every sample, of a boom with so many joints."""
@@ -157,9 +182,24 @@ class ReportBlock(NamedTuple):
         predicted = {at: self.predictions.one(row) for row, at in enumerate(places)}
         estimated = {at: self.estimates.one(row) for row, at in enumerate(places)}
         return [
-            Report(stamp, True, predicted.get(row), tuple(found[row]), health=self.health.get(row), estimate=estimated.get(row))
+            Report(
+                stamp,
+                (note := self.notes.get(row, REGULAR)).accepted,
+                predicted.get(row),
+                tuple(found[row]),
+                note.events,
+                note.status,
+                note.change,
+                self.health.get(row),
+                estimated.get(row),
+            )
             for row, stamp in enumerate(self.stamps.tolist())
         ]
+
+    def report(self, joints: int) -> Report:
+        """Return the report of the last sample, with those before it as `Report.earlier`."""
+        *earlier, last = self.reports(joints)
+        return replace(last, earlier=tuple(earlier))
 
 
 def block_of(samples: list[Sample], joints: int) -> SampleBlock:
@@ -179,81 +219,65 @@ def samples_in(block: SampleBlock, joints: int) -> list[Sample]:
     return [Sample(STREAMS[code], stamp, values[: counts[code]]) for code, stamp, values in rows]
 
 
-def report_block(reports: list[Report], joints: int) -> ReportBlock:
-    """Return reports as a block, of a boom with so many joints; events, changes and status are dropped."""
-    found = [(at, each.prediction) for at, each in enumerate(reports) if each.prediction is not None]
-    known = [(at, each) for at, report in enumerate(reports) for each in report.residuals]
-    channels = channels_of(joints)
-    width = max(len(names) for names in channels.values())
-    values, sigmas = np.full((len(known), width), np.nan), np.full((len(known), width), np.nan)
-    for row, (_, each) in enumerate(known):
-        values[row, : len(each.values)], sigmas[row, : len(each.sigmas)] = each.values, each.sigmas
-
-    def table(name: str, *columns: int) -> Array:
-        rows = [getattr(each, name) for _, each in found]
-        return np.array(rows, float).reshape(len(rows), *columns) if rows else np.zeros((0, *columns))
-
-    pins = 0 if not found or found[0][1].clearances is None else len(found[0][1].clearances)
-    moments = 0 if not found or found[0][1].moments is None else len(found[0][1].moments)
-    predictions = PredictionBlock(
-        at=np.array([at for at, _ in found], np.int64),
-        stamps=np.array([each.stamp for _, each in found], np.int64),
-        **{name: table(name, 2) for name in ("tip_position", "tip_displacement", "tip_velocity", "tip_acceleration")},
-        **{name: table(name) for name in ("tip_angle", "tip_angular_velocity", "tip_angular_acceleration")},
-        **{name: table(name, joints) for name in ("joints", "strokes", "cylinder_forces")},
-        clearances=table("clearances", pins, 4) if pins else np.zeros((len(found), 0, 4)),
-        moments=table("moments", moments) if moments else np.zeros((len(found), 0)),
-        outlines={row: drawn for row, (_, each) in enumerate(found) if (drawn := _outline_of(each)) is not None},
-    )
-    residuals = ResidualBlock(
-        at=np.array([at for at, _ in known], np.int64),
-        streams=np.array([CODES[each.stream] for _, each in known], np.int64),
-        stamps=np.array([each.stamp for _, each in known], np.int64),
-        values=values,
-        sigmas=sigmas,
-    )
-    health = {at: each.health for at, each in enumerate(reports) if each.health is not None}
-    estimates = EstimateBlock(predictions.stamps, table_of([each.estimate for each in reports if each.prediction is not None]))
-    return ReportBlock(np.array([each.stamp for each in reports], np.int64), predictions, estimates, residuals, health)
-
-
-def table_of(estimates: list[Estimate | None]) -> Array:
-    """Return rows of estimates, shape (k, WIDTH); NaN where there is none."""
-    return np.array([np.full(row_at.WIDTH, np.nan) if each is None else row_of(each) for each in estimates]).reshape(
-        -1, row_at.WIDTH
-    )
-
-
-def _outline_of(prediction: Prediction) -> Outline | None:
-    if prediction.shape is None or prediction.undeflected is None or prediction.pins is None:
-        return None
-    return Outline(prediction.shape, prediction.undeflected, prediction.pins)
-
-
 def joined(parts: list[ReportBlock]) -> ReportBlock:
     """Return one block that joins one or more blocks in order."""
+    if len(parts) == 1:
+        return parts[0]
     samples = np.cumsum([0, *(len(part.stamps) for part in parts)])[:-1].tolist()
-    residuals_at = [part.residuals.at + first for part, first in zip(parts, samples, strict=True)]
-    others = zip(*(part.residuals[1:] for part in parts), strict=True)
+    rows = np.cumsum([0, *(len(part.predictions.stamps) for part in parts)])[:-1].tolist()
+    outlines = [(part.predictions.outlines, first) for part, first in zip(parts, rows, strict=True)]
+    predictions = [part.predictions._replace(at=part.predictions.at + n) for part, n in zip(parts, samples, strict=True)]
+    residuals = [part.residuals._replace(at=part.residuals.at + n) for part, n in zip(parts, samples, strict=True)]
+    fields = map(np.concatenate, zip(*(part[:-1] for part in predictions), strict=True))
     return ReportBlock(
         np.concatenate([part.stamps for part in parts]),
-        _joined_predictions([(part.predictions, first) for part, first in zip(parts, samples, strict=True)]),
+        PredictionBlock._make([*fields, _moved(outlines)]),
         EstimateBlock(*(np.concatenate([getattr(part.estimates, each) for part in parts]) for each in ("stamps", "rows"))),
-        ResidualBlock._make([np.concatenate(residuals_at), *map(np.concatenate, others)]),
-        {first + row: health for part, first in zip(parts, samples, strict=True) for row, health in part.health.items()},
+        ResidualBlock(*map(np.concatenate, zip(*residuals, strict=True))),
+        _moved([(part.health, first) for part, first in zip(parts, samples, strict=True)]),
+        _moved([(part.notes, first) for part, first in zip(parts, samples, strict=True)]),
     )
 
 
-def _joined_predictions(parts: list[tuple[PredictionBlock, int]]) -> PredictionBlock:
-    """Return joined predictions; each block comes with the row of its first sample.
+def _moved(parts: list[tuple[dict[int, Item], int]]) -> dict[int, Item]:
+    return {first + row: item for found, first in parts for row, item in found.items()}
 
-    Blocks without predictions have no column widths and are skipped.
-    """
-    parts = [part for part in parts if len(part[0].stamps)] or parts[:1]
-    rows = np.cumsum([0, *(len(part.stamps) for part, _ in parts)])[:-1].tolist()
-    fields = zip(*(part[1:-1] for part, _ in parts), strict=True)
-    outlines = {
-        first + row: outline for (part, _), first in zip(parts, rows, strict=True) for row, outline in part.outlines.items()
-    }
-    at = np.concatenate([part.at + first for part, first in parts])
-    return PredictionBlock._make([at, *map(np.concatenate, fields), outlines])
+
+EVENTS = {
+    "late": "stamp not after the newest one of its stream; sample left out",
+    "duplicate": "stamp as the newest one of its stream, within 20 us; sample left out",
+    "partial": "some values missing, not finite or absurd; the others were used",
+    "empty": "no usable value; sample left out",
+    "waiting": "no message with all strokes yet, or started less than a second ago; the model has not started",
+    "gap": "longer pause between strokes, bridged",
+    "restart": "pause too long to bridge, or strokes elsewhere after it; started again from rest",
+    "stroke elsewhere": "a stroke jumped where its cylinder cannot go, and stayed there for a second; started from rest",
+    "leap": "stamp far from where its stream was; left out unless the next follows it within `gap`: slower strokes need more",
+    "clock set": "stamps went on elsewhere, strokes where they were; the model goes on, by the new stamps",
+    "jump back": "time was set back, and strokes did not go on where they were; started again from rest",
+    "second source": "samples of another source among those that are followed; left out",
+    "implausible": "a stroke where its cylinder cannot be; left out, for up to a second if it jumped there",
+    "out of range": "a stroke outside 0 to max_stroke of its cylinder; used where it is plausible",
+    "held": "a stroke missing for long; predicted by the other sensors and by how its cylinder moved",
+    "model": "the model failed; it starts again with the next full sample",
+    "reset": "asked for; the model started again from rest",
+    "load": "payload or line fill changed; the model started again from rest",
+    "limits": "other settings changed while the twin ran",
+    "zero": "the zero of a sensor was set anew",
+    "deflected": "tip further than half the boom's reach from the undeformed boom's: outside the model's validity",
+    "not used": "a stroke, though angles drive the model; left out",
+    "unmatched": "no prediction at the stamp of this sample; no residual",
+}
+
+CONSEQUENCES = frozenset({"waiting", "model"})
+"""Events that follow from others."""
+
+TOLD_AT_ONCE = frozenset({"restart", "stroke elsewhere", "clock set", "jump back", "reset", "load", "limits", "zero"})
+"""Events that `Report.change` goes with."""
+
+
+def event_meaning(name: str, reads: StrokeReading) -> str:
+    """Return the meaning of an event where these readings drive the model; empty for an unknown event."""
+    told = EVENTS.get(name, "")
+    is_of_angles = reads is StrokeReading.ANGLE and name != "not used"
+    return told.replace("strokes", "angles").replace("a stroke", "an angle") if is_of_angles else told

@@ -1,4 +1,7 @@
-"""One run of the twin, from a start of the model at rest to the next one: its stamps, and its check of strokes."""
+"""One run of the twin, from a start of the model at rest to the next one: its stamps, and its check of strokes or angles.
+
+CHECKED, TRUSTED and OTHERS of `boom_twin.twin.state.TwinState.clock` are updated by the check.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types import NANO, Array
-from .regular import reach_of_strokes
-from .state import CHECKED, EPOCH, IN_SLOT, NEWEST, OTHERS, TRUSTED, Limits, TwinState
+from .state import CHECKED, EPOCH, IN_SLOT, NEWEST, OTHERS, TRUSTED, Limits, TwinState, reach_of_strokes
 from .update import matched
 
 MOST_DOUBTED = 5  # largest number of implausible readings in a row, without a jump, that are left out
@@ -19,12 +21,13 @@ Flags = NDArray[np.bool_]
 
 
 class Run:
-    """State of the twin since the boom last started from rest, in addition to `TwinState`."""
+    """State of the twin since the boom last started from rest, in addition to `TwinState`, and check of its drives."""
 
     def __init__(self, state: TwinState, stamp: int, is_again: bool) -> None:
-        self.is_again, self._state = is_again, state
-        self.plausible = StrokeCheck(state.clock)
+        self.is_again, self._state, self._clock = is_again, state, state.clock
         self.is_predicted = False
+        self._before = 0
+        self._jumped = np.zeros(0, np.int64)  # stamp (ns) of a stroke's jump; NEVER without one
         state.clock[EPOCH] = state.clock[NEWEST] = stamp
         state.clock[IN_SLOT] = -1
         state.interval[:] = 0.0
@@ -65,18 +68,6 @@ class Run:
         self._state.clock[NEWEST] += shift
         self._state.past.bounds[:] = 0
 
-
-class StrokeCheck:
-    """Check of strokes or angles that drive the model in one run, against the estimates (n,) at the sample before.
-
-    CHECKED, TRUSTED and OTHERS of `boom_twin.twin.state.TwinState.clock` are updated.
-    """
-
-    def __init__(self, clock: NDArray[np.int64]) -> None:
-        self._clock = clock
-        self._before = 0
-        self._jumped = np.zeros(0, np.int64)  # stamp (ns) of a stroke's jump; NEVER without one
-
     def is_of_others(self, stamp: int, values: Array, estimate: Array, limits: Limits) -> bool:
         """Return True if two or more strokes are out of reach of their cylinders, probably of another boom.
 
@@ -92,7 +83,7 @@ class StrokeCheck:
     def _limit(self, stamp: int, limits: Limits) -> float:
         return float(reach_of_strokes(limits.far, limits.rate, stamp - int(self._clock[CHECKED])))
 
-    def of(
+    def checked(
         self, stamp: int, values: Array, before: Array, estimate: Array | None, rates: Array, limits: Limits
     ) -> tuple[Array, list[str]]:
         """Return the strokes (n,) for the model, NaN = missing, and events. The caller then checks `must_restart`.

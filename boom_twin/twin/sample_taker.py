@@ -15,7 +15,9 @@ from ..deviation.predictor import BoomPredictor
 from ..errors import BoomTwinError, SolverError
 from ..health.causes import Hypothesis
 from ..health.fault_twins import FaultTwins, Follower
+from ..health.monitor import HealthMonitor
 from ..kernels.tables import SENTENCES
+from ..scene.edit import loaded
 from ..scene.load import SceneSource, as_scene
 from ..types import (
     LIMIT,
@@ -26,22 +28,19 @@ from ..types import (
     Change,
     Mount,
     Place,
-    Report,
     Sample,
     Stream,
     StrokeReading,
     channels_of,
     streams_of,
 )
-from .adjustments import Requests, ResidualBuffer, SensorZeros
-from .block_update import BlockUpdate, LoadShedding
-from .blocks import CODES, SampleBlock
-from .loaded_model import LoadedModel, limits_of, loaded_model
-from .regular import SHORTEST_STEP, near
+from .adjustments import Requests, ResidualBuffer, SensorZeros, limits_of
+from .block_update import BlockUpdate
+from .blocks import CODES, REGULAR, Note, ReportBlock, SampleBlock, joined
 from .run import Run
 from .sample_check import SampleCheck
 from .stamp_check import Action, StampCheck, TimeStep, verdict_on
-from .state import FOLLOWER_ROOM, NEWEST, NONE, ROOM, STATUS, UNMATCHED, Room, drop_waiting, new_state
+from .state import FOLLOWER_ROOM, NEWEST, NONE, ROOM, SHORTEST_STEP, STATUS, UNMATCHED, Room, drop_waiting, near, new_state
 from .update import DONE, FAILED
 
 
@@ -68,7 +67,6 @@ class SampleTaker:
         self.reads, self._drive, self.absent, scene = reads, reads.stream, frozenset(absent), as_scene(scene)
         self.scene, self.settings, self._health = scene, settings or Settings(), health
         self.counts: Counter[str] = Counter()
-        self.shedding = LoadShedding()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self.places, self.lagging = dict(places), tuple(lagging)
         self._channels = channels_of(len(scene.joints), streams_of(self.places))
@@ -87,7 +85,7 @@ class SampleTaker:
     def _begin(self) -> None:
         self._state = new_state(len(self.scene.joints), np.array(self._widths), self._room)
         self._state.clock[NEWEST] = NONE
-        self._adopt(self._model(self.settings))
+        self._make_model()
         self._run: Run | None = None
         self._is_new = True
         self._failed: int | None = None
@@ -121,29 +119,25 @@ class SampleTaker:
     def _new_lines(self) -> dict[Stream, StampCheck]:
         return {stream: StampCheck(self.settings, self._state, CODES[stream]) for stream in Stream}
 
-    def _model(self, settings: Settings) -> LoadedModel:
-        self._former: BlockUpdate | None = None
-        placed = self.absent, self.places, self.lagging
-        return loaded_model(self.scene, settings, self.mounts, self._health, self.reads, *placed)
-
-    def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
-        """Use this model, which has the present load, in place of that of `before`."""
-        if before is not None:
-            model.boom.filters.lags[:] = self._boom.filters.lags
-        self._boom, self.judge = model.boom, model.judge
-        self._boom.doubt(self._doubted)
-        if self.judge is not None:
-            self.judge.fault_twins = self._fault_twins
-        self.plan = self._boom.plan
-        parts = self._boom, model.limits, self._state, self._channels, self.judge
-        self._former = before  # let go of when the next model is made, which may be in a thread of its own
-        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, self._room.samples, before)
+    def _make_model(self) -> None:
+        """Make the parts of the model that depend on the load."""
+        settings, scene = self.settings, loaded(self.scene, *self.settings.load)
+        boom = BoomPredictor(scene, settings, self.mounts, self.reads, self.places, self.lagging)
+        boom.doubt(self._doubted)
+        judge: HealthMonitor | None = None
+        if self._health:
+            judge = HealthMonitor(scene, settings, self.mounts, self.absent, boom.channels, self.reads, self.places)
+            judge.fault_twins = self._fault_twins
+        self._boom, self.plan, self.judge = boom, boom.plan, judge
+        limits = limits_of(self.scene, boom, settings, self.absent, self.reads)
+        parts = boom, limits, self._state, self._channels, judge
+        self._compiled = BlockUpdate(*parts, self.counts, self._room.samples)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, max(self._widths))))
 
     def _take_over(self, stamp: int) -> list[str]:
         """Apply the requested changes; return the events. Another load, or other zeros of strokes, need a start from rest."""
         asked, before = self.requests, self.settings
-        model, is_new = asked.model, asked.is_new and self._run is not None
+        is_new = asked.is_new and self._run is not None
         from_rest, self.settings = asked.take(), asked.settings
         if is_new:
             self._begin()
@@ -161,7 +155,9 @@ class SampleTaker:
             events += [] if events else ["reset"]
             self._begin_anew_at(stamp)
         if "load" in events:
-            self._adopt(model or self._model(self.settings), self._compiled)
+            lags = self._boom.filters.lags
+            self._make_model()
+            self._boom.filters.lags[:] = lags
         return events
 
     def _begin_anew_at(self, stamp: int) -> None:
@@ -183,7 +179,7 @@ class SampleTaker:
         reason, _ = self._compiled.advance(self._run, one, trusted)
         return reason
 
-    def _look_at(self, sample: Sample) -> Report:
+    def _look_at(self, sample: Sample) -> ReportBlock:
         """Take a sample that may be irregular. It is copied, since it may be held and the caller's arrays may change."""
         self._compiled.make_room()
         sample = replace(sample, values=sample.values.copy())
@@ -199,14 +195,12 @@ class SampleTaker:
             return self._refuse(sample, "not used")
         return self._take_measured(sample, complete)
 
-    def _take_strokes(self, sample: Sample, complete: bool) -> Report:
+    def _take_strokes(self, sample: Sample, complete: bool) -> ReportBlock:
         line, run, values = self._lines[self._drive], self._run, self._zeroed(sample)
         if run is None:
             return self._follow(sample, values, complete, [])
         if line.is_next(sample.stamp) and sample.stamp - run.newest >= SHORTEST_STEP:
-            if run.plausible.is_of_others(
-                sample.stamp - run.epoch, values, self._boom.extrapolated(0.0), self._compiled.limits
-            ):
+            if run.is_of_others(sample.stamp - run.epoch, values, self._boom.extrapolated(0.0), self._compiled.limits):
                 return self._refuse(sample, "implausible")
             return self._follow(sample, values, complete, [])
         verdict = verdict_on(sample, line, run, self._boom, self._compiled.limits, self.settings, self._zeroed)
@@ -216,7 +210,7 @@ class SampleTaker:
             return self._step_in_time(run, line, verdict.why)
         return self._refuse(sample, verdict.event, held=verdict.action is Action.HOLD)
 
-    def _step_in_time(self, run: Run, line: StampCheck, why: TimeStep) -> Report:
+    def _step_in_time(self, run: Run, line: StampCheck, why: TimeStep) -> ReportBlock:
         held, usual = line.release(self.counts), round(line.usual)
         span = held[0].stamp - run.newest
         events = ["gap"] if span * NANO > self.settings.gap else []
@@ -227,13 +221,13 @@ class SampleTaker:
             events = ["restart" if span > 0 else "jump back"]
             self._restart()
         elif events and why is TimeStep.EITHER:
-            self._boom.add_phase(self._boom.prediction(run.newest))
+            self._boom.add_phase()
         reports, asked = [], self._judged
         for sample in held:
             complete, self._judged = self._is_complete(sample), asked or sample is not held[-1]
             reports.append(self._follow(sample, self._zeroed(sample), complete, events))
             events = []
-        return replace(reports[-1], earlier=tuple(reports[:-1]))
+        return joined([*(each.noted(was_held=True) for each in reports[:-1]), reports[-1]])
 
     def _rebase(self, run: Run, shift: int) -> None:
         before = run.newest
@@ -255,7 +249,7 @@ class SampleTaker:
         expected = self._boom.extrapolated(0.0)
         return np.where(self._compiled.limits.turns, near(values, expected, True), values)
 
-    def _follow(self, sample: Sample, values: Array, complete: bool, events: list[str]) -> Report:
+    def _follow(self, sample: Sample, values: Array, complete: bool, events: list[str]) -> ReportBlock:
         """Step to a stroke sample, whose `values` are without the sensors' zeros; start the model if it has not started."""
         if not complete:
             events.append("partial")
@@ -274,14 +268,14 @@ class SampleTaker:
             report, from_rest = self._start(sample, events), True
         else:
             return self._refuse(sample, "waiting", *events)
-        if told or (from_rest and report.accepted):
+        has_begun = from_rest and report.notes.get(0, REGULAR).accepted
+        if told or has_begun:
             is_new = from_rest and self._is_new
-            if from_rest and report.accepted:
-                self._is_new = False
-            return replace(report, change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values, is_new))
+            self._is_new &= not has_begun
+            return report.noted(change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values, is_new))
         return report
 
-    def _start(self, sample: Sample, events: list[str]) -> Report:
+    def _start(self, sample: Sample, events: list[str]) -> ReportBlock:
         try:
             sample = replace(sample, values=self._boom.start(sample.values, not self._is_new))
         except BoomTwinError as error:
@@ -290,12 +284,12 @@ class SampleTaker:
         self._run = Run(self._state, sample.stamp, not self._is_new)
         return self._step(self._run, sample, events)
 
-    def _step(self, run: Run, sample: Sample, events: list[str]) -> Report:
+    def _step(self, run: Run, sample: Sample, events: list[str]) -> ReportBlock:
         self._lines[self._drive].take(sample.stamp)
         estimate = self._boom.extrapolated(0.0) if run.is_predicted else None
-        before, rates, check = self._state.strokes, self._boom.speeds, run.plausible
-        taken, oddities = check.of(sample.stamp - run.epoch, sample.values, before, estimate, rates, self._compiled.limits)
-        if check.must_restart and np.isfinite(sample.values).all():
+        before, rates = self._state.strokes, self._boom.speeds
+        taken, oddities = run.checked(sample.stamp - run.epoch, sample.values, before, estimate, rates, self._compiled.limits)
+        if run.must_restart and np.isfinite(sample.values).all():
             self._begin_anew_at(sample.stamp)
             return self._follow(sample, sample.values, True, [*events, "stroke elsewhere"])
         run.is_predicted = True
@@ -304,16 +298,16 @@ class SampleTaker:
         if self._advance_one(sample, trusted=True) == FAILED:
             return self._fail(sample, events)
         self.counts.update(events)
-        return self._compiled.report(sample.stamp, events, self._judged)
+        return self._compiled.rows(np.array([sample.stamp]), events, self._judged)
 
-    def _fail(self, sample: Sample, events: list[str]) -> Report:
+    def _fail(self, sample: Sample, events: list[str]) -> ReportBlock:
         self._restart()
         self._failed = sample.stamp
         return self._refuse(sample, "model", *events, status=SENTENCES[int(self._state.clock[STATUS])])
 
     # -- measured angles and accelerations ----------------------------------------------------------------------------
 
-    def _take_measured(self, sample: Sample, complete: bool) -> Report:
+    def _take_measured(self, sample: Sample, complete: bool) -> ReportBlock:
         line = self._lines[sample.stream]
         longest = line.longest if line.usual else self.settings.leap / NANO
         if line.newest is None or 0 < sample.stamp - line.newest <= longest:
@@ -328,9 +322,9 @@ class SampleTaker:
         gone = drop_waiting(self._state, held[0].stamp, -NONE, CODES[sample.stream])  # their time comes again: a looped bag
         self._state.clock[UNMATCHED] += gone
         reports = [self._compare(each, self._is_complete(each)) for each in held]
-        return replace(reports[-1], earlier=tuple(reports[:-1]))
+        return joined([*(each.noted(was_held=True) for each in reports[:-1]), reports[-1]])
 
-    def _compare(self, sample: Sample, complete: bool) -> Report:
+    def _compare(self, sample: Sample, complete: bool) -> ReportBlock:
         self._lines[sample.stream].take(sample.stamp)
         events: tuple[str, ...] = ()
         if not complete:
@@ -338,12 +332,12 @@ class SampleTaker:
             self.counts.update(events)
         if self._advance_one(sample, trusted=True) != DONE:
             return self._refuse(sample, "unmatched", *events)
-        return self._compiled.report(sample.stamp, events)
+        return self._compiled.rows(np.array([sample.stamp]), events)
 
-    def _refuse(self, sample: Sample, *events: str, status: str = "ok", held: bool = False) -> Report:
+    def _refuse(self, sample: Sample, *events: str, status: str = "ok", held: bool = False) -> ReportBlock:
         """Return the report of a sample whose values are not used, or if `held` not used for now."""
         self.counts.update(events)
-        return Report(sample.stamp, held, events=events, status=status)
+        return self._compiled.no_rows(sample.stamp, Note(held, events, status))
 
     def _is_complete(self, sample: Sample) -> bool:
         return bool((np.abs(sample.values) <= LIMIT)[self._there[sample.stream]].all())

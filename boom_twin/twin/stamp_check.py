@@ -16,9 +16,8 @@ import numpy as np
 from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
 from ..types import NANO, SECOND, Array, Sample
-from .regular import SHORTEST_STEP, USUAL_STEP, is_next, longest_step, note_stamp
 from .run import Run
-from .state import NONE, Limits, TwinState
+from .state import NONE, SHORTEST_STEP, USUAL_STEP, Limits, TwinState, is_next, longest_step, note_stamp
 
 EARLY_STEP = 8.0  # usual intervals, longest step ahead that is accepted at once if the strokes are as expected
 MOST_HELD = 1024  # samples that wait

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from typing import Any
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ..config.settings import Settings
 from ..errors import UsageError
 from ..health.monitor import warm_up
 from ..scene.kinematics import strokes_of_angles
-from ..types import SECOND, Array, Clock, Health, Report, Sample, Stream, StrokeReading
-from .blocks import STREAMS, ReportBlock, SampleBlock, block_of
-from .loaded_model import LoadedModel
-from .readings import check_units, merged, samples_of
+from ..types import SECOND, Array, Change, Clock, Health, Report, Sample, Stream, StrokeReading
+from .blocks import CODES, REGULAR, STREAMS, ReportBlock, SampleBlock, block_of, joined
+from .sample_check import check_units, merged, samples_of
 from .sample_taker import SampleTaker
-from .update import DONE, FAILED
+from .update import DONE, FAILED, ODD
+
+Item = TypeVar("Item", Sample, SampleBlock)
+Result = TypeVar("Result")
 
 
 class Twin(SampleTaker):
@@ -56,12 +57,10 @@ class Twin(SampleTaker):
     mounts : tuple of Mount or None
         As given, one for every joint.
     counts : Counter
-        How often each of `boom_twin.twin.events.EVENTS` happened.
+        How often each of `boom_twin.twin.blocks.EVENTS` happened.
     requests : Requests
         What is asked while samples come: another load, other limits, a start from rest. It takes effect with the next full
         stroke sample, which `Report.change` tells.
-    shedding : LoadShedding
-        Is told by a live user how full the queue of samples is; decides what is then left out.
     judge : HealthMonitor or None
         Of the rig's health; None without `health`.
 
@@ -129,25 +128,6 @@ class Twin(SampleTaker):
         self.requests.zero(found)
         return found
 
-    def model(self, settings: Settings) -> LoadedModel:
-        """Return the model under the load of `settings`; another thread may call this.
-
-        Parameters
-        ----------
-        settings : Settings
-
-        Returns
-        -------
-        LoadedModel
-            For `requests.tune`.
-
-        Raises
-        ------
-        UsageError
-            The load cannot be.
-        """
-        return self._model(settings)
-
     def zeros(self, channels: Collection[str]) -> tuple[Array, Array]:
         """Return the estimated zeros of sensors of angles, IMU and forces, and their variances.
 
@@ -183,7 +163,7 @@ class Twin(SampleTaker):
         ----------
         sample : Sample or mapping of str to float
             Values of one stream at one stamp, in the scene's order; or readings in SI units by name, of any streams, as for
-            `boom_twin.twin.readings.samples_of`. Their reports are one.
+            `boom_twin.twin.sample_check.samples_of`. Their reports are one.
         judged : bool
             With the judgement of the rig's health, where that is due. Without it the rest comes sooner, and `judge_health`
             is to be called next.
@@ -206,12 +186,15 @@ class Twin(SampleTaker):
         sample, self._judged = self._edge.checked(sample), judged
         if self._fault_twins is not None:
             self._fault_twins.reach(sample.stamp, self._failing)
-        if self._run is None or (self.requests.due and sample.stream is self._drive):
-            return self._told(sample, self._look_at(sample))
-        reason = self._advance_one(sample)
-        if reason == DONE:
-            return self._told(sample, self._compiled.report(sample.stamp, (), judged))
-        return self._told(sample, self._fail(sample, []) if reason == FAILED else self._look_at(sample))
+        reason = ODD
+        if self._run is not None and not (self.requests.due and sample.stream is self._drive):
+            reason = self._advance_one(sample)
+        if reason != DONE:
+            return self._take_irregular(sample, reason).report(self.plan.joints)
+        report = self._compiled.report(sample.stamp, judged)
+        if self._fault_twins is not None:
+            self._fault_twins.take(block_of([sample], self.plan.joints))
+        return report
 
     def samples(self, readings: Mapping[str, Any], stamp_ns: int | None) -> list[Sample]:
         """Return the samples of readings by name in SI units.
@@ -238,13 +221,14 @@ class Twin(SampleTaker):
             check_units(found)
         return found
 
-    def _told(self, sample: Sample, report: Report) -> Report:
-        """Return the report of a sample, after the fault twins are given both."""
+    def _take_irregular(self, sample: Sample, reason: int) -> ReportBlock:
+        """Take a sample that the compiled update did not take; tell the fault twins."""
+        rows = self._fail(sample, []) if reason == FAILED else self._look_at(sample)
         if self._fault_twins is not None:
-            if report.change is not None:
-                self._fault_twins.change(report.change)
+            if (change := rows.notes.get(len(rows.stamps) - 1, REGULAR).change) is not None:
+                self._fault_twins.change(change)
             self._fault_twins.take(block_of([sample], self.plan.joints))
-        return report
+        return rows
 
     @property
     def is_health_due(self) -> bool:
@@ -255,7 +239,7 @@ class Twin(SampleTaker):
         """Judge the rig's health, if `update` left that out for its last sample; see `Report.health`."""
         return self._compiled.judge()
 
-    def update_block(self, block: SampleBlock) -> list[ReportBlock | Report]:
+    def take(self, block: SampleBlock) -> ReportBlock:
         """Take the samples of a block in turn, as `update` does each of them.
 
         Parameters
@@ -264,40 +248,56 @@ class Twin(SampleTaker):
 
         Returns
         -------
-        list of ReportBlock or Report
-            In the order of the samples: blocks of reports of regular samples, and a report of every other sample.
+        ReportBlock
+            Reports of the samples in their order. Those of samples that were held stand before the one that confirmed them.
 
         Raises
         ------
         UsageError
             As `update` does; the samples before have been taken.
         """
-        found: list[ReportBlock | Report] = []
+        found: list[ReportBlock] = []
         block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
-        row, size, channels, self._judged = 0, len(block.stamps), self._widths, True
+        row, size, drive, self._judged = 0, len(block.stamps), CODES[self._drive], True
         while row < size:
-            if self._run is not None and self._edge.is_sure and not self.requests.due:
-                end = row + self._room.samples
-                if self._fault_twins is not None:  # they take a second before its verdict may be asked for
-                    self._fault_twins.reach(int(block.stamps[row]), self._failing)
-                    is_later = block.stamps[row:end] // SECOND != block.stamps[row] // SECOND
-                    end = row + int(is_later.argmax()) if is_later.any() else end
-                part = SampleBlock(block.streams[row:end], block.stamps[row:end], block.values[row:end])
+            is_sure = self._run is not None and self._edge.is_sure and not self.requests.due
+            end = row + (self._room.samples if is_sure else 1)
+            stamp, is_drive = int(block.stamps[row]), block.streams[row] == drive
+            if is_drive:
+                self._edge.look(stamp)
+            if self._fault_twins is not None:  # they take a second before its verdict may be asked for
+                self._fault_twins.reach(stamp, self._failing)
+                is_later = block.stamps[row:end] // SECOND != stamp // SECOND
+                end = row + int(is_later.argmax()) if is_later.any() else end
+            part, reason, done = block.part(slice(row, end)), ODD, 0
+            if self._run is not None and not (self.requests.due and is_drive):
                 reason, done = self._compiled.advance(self._run, part)
-                if done:
-                    found += self._compiled.reports(part.stamps[:done])
-                    if self._fault_twins is not None:
-                        self._fault_twins.take(SampleBlock(part.streams[:done], part.stamps[:done], part.values[:done]))
+            if done:
+                part = part.part(slice(done))
+                found.append(self._compiled.rows(part.stamps))
+                if self._fault_twins is not None:
+                    self._fault_twins.take(part)
                 row += done
-                if reason == DONE:
-                    continue
-                sample = self._sample(block, row, channels)
-                found.append(self._told(sample, self._fail(sample, []) if reason == FAILED else self._look_at(sample)))
-            else:
-                found.append(self.update(self._sample(block, row, channels)))
-            row += 1
-        return found
+            if reason != DONE:
+                found.append(self._take_irregular(self._sample(block, row), reason))
+                row += 1
+        return joined(found) if found else self._compiled.no_rows(0, REGULAR)._replace(stamps=block.stamps, notes={})
 
-    def _sample(self, block: SampleBlock, row: int, channels: list[int]) -> Sample:
+    def _sample(self, block: SampleBlock, row: int) -> Sample:
         code = int(block.streams[row])
-        return Sample(STREAMS[code], int(block.stamps[row]), block.values[row, : channels[code]].copy())
+        return Sample(STREAMS[code], int(block.stamps[row]), block.values[row, : self._widths[code]].copy())
+
+
+def drive(
+    twin: Twin, update: Callable[[Item], Result], items: Iterable[Item | Change | None]
+) -> Iterator[tuple[Item, Result] | None]:
+    """Yield each item with what `update` gives of it; request each change from the twin at its place.
+
+    `update` is `twin.update` or `twin.take`. A change takes effect with the next full stroke sample, as in the recording.
+    None, a message without a usable value, gives None.
+    """
+    for item in items:
+        if isinstance(item, Change):
+            twin.requests.repeat(item)
+        else:
+            yield None if item is None else (item, update(item))

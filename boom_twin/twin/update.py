@@ -19,7 +19,6 @@ from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import OK
 from ..types import NANO
-from .regular import SMOOTHING, are_strokes_regular, is_regular, note_stamp
 from .state import (
     BEGINS_SLOT,
     COUNT,
@@ -28,10 +27,14 @@ from .state import (
     IS_DEFLECTED,
     NEWEST,
     SLOT,
+    SMOOTHING,
     STATUS,
     UNMATCHED,
     WAITING,
+    are_strokes_regular,
+    is_regular,
     new_row,
+    note_stamp,
     zeros_at,
 )  # fmt: skip
 
@@ -76,7 +79,7 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
             give_innovations(f, limits, state, stamp, row, found)
         results = results_in(out, state.strokes.shape[0], t.clearances.shape[0])
         past, at = state.past, keep_strokes(state, stamp)
-        write_expected_readings(p, f, live, results, span, past.values[at], past.sigmas[at])
+        write_expected_readings(p, f, live, results, stamp, span, past.values[at], past.sigmas[at])
         flush_waiting(limits, state, row, found)
         take_residuals(limits, state, p, f, before, found)
         write_tip_estimate(p, f, results, found.estimates[found.counts[0] - 1])

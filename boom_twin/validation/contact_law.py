@@ -15,8 +15,6 @@ from math import hypot, log1p, sqrt, tanh
 
 from scipy.optimize import brentq
 
-LEAST_SPEED = 1e-3  # m/s, of approach at entry
-
 
 def keeping(restitution: float) -> float:
     """Return chi with which an impact keeps the share e of its speed: chi (1 + e) = log[(1 + chi)/(1 - chi e)]."""
@@ -75,7 +73,7 @@ class Contact:
         elastic = float(self.stiffness * depth**self.exponent)
         if entry is None or depth == 0.0:
             return elastic
-        return max(elastic * (1.0 + self.hysteresis * gap_rate / max(entry, LEAST_SPEED)), 0.0)
+        return max(elastic * (1.0 + self.hysteresis * gap_rate / max(entry, 1e-3)), 0.0)  # 1 mm/s at least
 
     def force(self, offset: complex, rate: complex, entry: float | None) -> complex:
         """Return the force (N) of the bush on the pin, complex; offset (m) and rate (m/s) of the pin against the bush."""

@@ -7,6 +7,7 @@ in another way costs `SURE` nats more.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -15,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..types import SENSORS, Stream, channels_of
-from .expected import Expected, RestModel
 from .hypotheses import (
     ANY_ZERO,
     MOST,
@@ -35,7 +35,7 @@ from .hypotheses import (
     stroke_cube,
     without,
 )
-from .readings import Channel, Table, Window, tables_of
+from .readings import Channel, Expected, RestModel, Table, Window, tables_of
 
 SURE = 7.0  # nats to the next hypothesis, least margin that determines a channel
 WRONG = 4.0  # nats per block (2.8 standard deviations) above which a channel is not as declared
@@ -258,3 +258,45 @@ class _Checker:
                 each.margin for each in found if each.stream is stream is Stream.ANGLES and each.is_wrong and not each.is_sure
             ]
         return tuple(found)
+
+
+UNEXPLAINED = "no name, unit, sign or zero explains its readings"
+ABSENT = "in no message: no such sensor, or it is broken"
+STROKES_ALONE = "strokes are within the travels; swapped or shifted ones show only beside angles, forces or an IMU"
+
+
+def reading(way: Channel) -> str:
+    """Return how a channel is read."""
+    parts = [way.name, way.unit]
+    parts += ["sign -1"] if way.sign < 0 else []
+    parts += [f"zero {way.zero:.6g}"] if way.zero else []
+    parts += [f"scale {way.scale:g}"] if way.scale != 1.0 else []
+    parts += [f"absolute at the {way.absolute}"] if way.absolute else []
+    parts += [f"turned by {math.degrees(way.turned):+.1f} deg"] if way.turned else []
+    return ", ".join(parts)
+
+
+def finding(verdict: Verdict, checked: Checked) -> str:
+    """Return the finding about a channel."""
+    if checked.lacks(verdict):
+        return ABSENT
+    if not verdict.is_wrong:
+        return "within the travel" if checked.has_strokes_alone else "as declared"
+    if not verdict.is_explained or verdict.best is None:
+        return f"not as declared: {UNEXPLAINED}"
+    if verdict.is_sure:
+        return likely(verdict)
+    why = "several ways explain it" if checked.moved else "the boom stood still"
+    return f"not as declared; not determined: {why}; {likely(verdict)}"
+
+
+def likely(verdict: Verdict) -> str:
+    """Return the most likely way in which a wrong channel is read."""
+    way = "gravity taken out" if verdict.has_no_gravity or verdict.best is None else reading(verdict.best)
+    return way if verdict.is_sure else f"perhaps {way}"
+
+
+def channel_name(verdict: Verdict) -> str:
+    """Return the name that alarms give the sensor."""
+    kind = SENSORS[verdict.stream]
+    return kind.stem if kind.is_accelerometer else verdict.channel

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
 from ..types import GIVE, SENSORS, Array, Stream
-from .expected import Expected
-from .readings import Channel, Table
+from .readings import Channel, Expected, Table
 
 ANGLE_ERROR = math.radians(0.7)  # rad, zero error of an encoder and error of the scene
 GRAVITY_ERROR = 0.6  # m/s^2, bias of an IMU and mean acceleration of the tip

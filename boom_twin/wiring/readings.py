@@ -1,14 +1,26 @@
-"""Readings of a session by name, and their means in the blocks that a commissioning check compares."""
+"""Readings of a session by name in the blocks that a commissioning check compares, their expected values, and their lags."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import SENSORS, Array, Mount, Stream
+from ..analysis.equilibrium import settle
+from ..compiler.compile import compile_scene
+from ..compiler.plan import first_row, taken_apart
+from ..config.settings import Settings
+from ..deviation.channels import READS_ACCELERATION, measurement_of
+from ..deviation.posture import locate
+from ..deviation.sensor_model import mounting_of
+from ..errors import BoomTwinError
+from ..scene.edit import with_rigid_cylinders
+from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes
+from ..scene.schema import Scene
+from ..types import NANO, NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading
 
 BLOCK = 100_000_000  # ns, averaging time of readings
 MEAN = 10  # blocks on each side in the mean of forces and accelerations, which removes vibration
@@ -96,3 +108,115 @@ def _at(chosen: NDArray[np.int64], numbers: NDArray[np.int64], means: Array, rea
         mean, square = ((each[end] - each[first]) / (end - first) for each in sums)
     share = np.minimum(CORRELATED / np.maximum(end - first, 1), 1.0)
     return np.array([mean + middle, np.sqrt(np.maximum(square - mean**2, 0.0) * share)])
+
+
+SPAN = 4.0  # s, span whose mean is removed, so that zeros and slow model errors are no lag
+LONGEST, COARSE = 1.0, 0.05  # s, largest lag of the search, and spacing of the first guesses
+ROUNDS = 6  # Gauss-Newton steps
+FEWEST = 3.0  # least effective number of moving spans and channels
+CLEAR = 0.5  # largest squared residual with the lag, relative to that without
+FLOOR = 1e-3  # s, standard deviation of a lag by model errors
+
+
+class Lag(NamedTuple):
+    """Lag of a stream and standard deviation, s. `sigma` is infinite if no lag is found."""
+
+    lag: float
+    sigma: float
+
+
+def lag_of(stamps: NDArray[np.int64], read: Array, expected: Array) -> Lag:
+    """Return the lag of readings behind expected ones, both (k, channels), at `stamps` (k,) in ns.
+
+    Gauss-Newton starts from the best of several guesses. The scatter among spans gives the deviation.
+    """
+    times = (stamps - stamps[0]) * NANO
+    spans = (times // SPAN).astype(int)
+    off = [_left(times, spans, read, expected, lag)[0] for lag in np.arange(-LONGEST, LONGEST + COARSE, COARSE)]
+    sizes = np.array([np.nansum(each**2, axis=0) for each in off])
+    scale = np.fmax(np.nanmin(sizes, axis=0), 1e-300) / max(len(times), 1)
+    lag = float(np.arange(-LONGEST, LONGEST + COARSE, COARSE)[int((sizes / scale).sum(axis=1).argmin())])
+    before = float((np.nansum(_left(times, spans, read, expected, 0.0)[0] ** 2, axis=0) / scale).sum())
+    for _ in range(ROUNDS):
+        left, slopes = _left(times, spans, read, expected, lag)
+        by, weight = (_summed(spans, np.nan_to_num(each / scale)) for each in (-left * slopes, slopes**2))
+        if not weight.sum() > 0.0 or weight.sum() ** 2 < FEWEST * (weight**2).sum():
+            return Lag(0.0, math.inf)
+        change = float(by.sum() / weight.sum())
+        lag += min(max(change, -COARSE), COARSE)
+    after = float((np.nansum(left**2, axis=0) / scale).sum())
+    if abs(lag) > LONGEST or (abs(lag) > COARSE and after > CLEAR * before):
+        return Lag(0.0, math.inf)
+    scatter = math.sqrt(float(((by - change * weight) ** 2).sum())) / float(weight.sum())
+    return Lag(lag, math.hypot(scatter, FLOOR))
+
+
+def _left(times: Array, spans: NDArray[np.int64], read: Array, expected: Array, lag: float) -> tuple[Array, Array]:
+    """Return residuals to the readings expected `lag` s before, and their rates, each less its mean in a span."""
+    then, step = times - lag, 0.005
+    columns = [np.interp(then, times, column) for column in expected.T]
+    slopes = [(np.interp(then + step, times, c) - np.interp(then - step, times, c)) / (2.0 * step) for c in expected.T]
+    left = read - np.column_stack(columns)
+    left[(then < times[0]) | (then > times[-1])] = np.nan
+    return _less_mean(spans, left), _less_mean(spans, np.where(np.isfinite(left), np.column_stack(slopes), np.nan))
+
+
+def _less_mean(spans: NDArray[np.int64], values: Array) -> Array:
+    known = np.isfinite(values)
+    sums = _summed(spans, np.where(known, values, 0.0))
+    counts = np.maximum(_summed(spans, known.astype(float)), 1.0)
+    return np.asarray(values - (sums / counts)[spans])
+
+
+def _summed(spans: NDArray[np.int64], values: Array) -> Array:
+    return np.column_stack([np.bincount(spans, column, spans.max() + 1) for column in values.T])
+
+
+class Expected(NamedTuple):
+    """Expected readings in every block, NaN if no posture has its strokes."""
+
+    angles: dict[Mount | None, Array]  # (blocks, n), encoders (None), inclinometers at root and head of each section, rad
+    forces: Array  # (blocks, n), N
+    gravity: dict[Stream, Array]  # (blocks,), at rest at every IMU, along its section and (imaginary) across, m/s^2
+
+
+class RestModel:
+    """Model of a scene, with its load, at rest; `reads` is what the strokes are. For `places` see `boom_twin.Twin`."""
+
+    def __init__(self, scene: Scene, reads: StrokeReading, places: Mapping[str, Place] = NO_PLACES) -> None:
+        self.scene = scene
+        self._plan = compile_scene(with_rigid_cylinders(scene) if reads is StrokeReading.LENGTH else scene)
+        self._state, self._work = self._plan.state(), self._plan.work()
+        joints = self._plan.joints
+        kinds: tuple[Mount, ...] = "root", "head"
+        self._frames = {kind: mounting_of(self._plan, [kind] * joints).frames for kind in kinds}
+        self._measured = measurement_of(self._plan, Settings(), mounting_of(self._plan, ()), places)
+        streams, channels = tuple(Stream), self._measured.channels
+        self._imus = {streams[row.stream]: int(row.site) for row in channels[channels.kind == READS_ACCELERATION]}
+        self._known: dict[bytes, Array] = {}  # rows of `_at_rest`, by strokes
+
+    def expected(self, strokes: Array) -> Expected:
+        """Return the expected readings for strokes (blocks, n), m; those of earlier calls are looked up."""
+        blocks, n = strokes.shape
+        keys = [row.tobytes() for row in strokes]
+        for key, row in zip(keys, strokes, strict=True):
+            if key not in self._known:
+                self._known[key] = self._at_rest(row)
+        found = np.array([self._known[key] for key in keys]).reshape(blocks, 4 * n + len(self._imus))
+        joints, root, head, forces = found[:, : 4 * n].reshape(blocks, 4, n).swapaxes(0, 1)
+        angles: dict[Mount | None, Array] = {None: joints, "root": root, "head": head}
+        up = -complex(*gravity_in_base(self.scene))
+        gravity = {stream: up * np.exp(-1j * angle) for stream, angle in zip(self._imus, found[:, 4 * n :].T, strict=True)}
+        return Expected(angles, forces, gravity)
+
+    def _at_rest(self, strokes: Array) -> Array:
+        """Return joint angles, inclinations (root, head), forces, and angles of IMUs; NaN if there is no posture."""
+        try:
+            near = joint_angles_of_strokes(self.scene, strokes)
+            settle(self._plan, self._state, self._work, strokes, near)
+        except BoomTwinError:
+            return np.full(4 * len(strokes) + len(self._imus), np.nan)
+        found, frames = taken_apart(self._plan, first_row(self._plan, self._state)), self._state.frames
+        mounted = [frames[places, 2] + self.scene.base.inclination for places in self._frames.values()]
+        imus = [locate(self._plan.tables, self._state, self._measured, site)[2] for site in self._imus.values()]
+        return np.concatenate([found.joints, *mounted, found.cylinder_forces, imus])

@@ -1,16 +1,16 @@
-"""The balances of energy and momentum that `simulate --check` prints: closed with the square of the step, with contact too."""
+"""The balances of energy and momentum along a motion: closed with the square of the step, with contact too."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from convergence.balances import Momenta, energy_balance, momentum_balance
 from default_boom import motion_of
 from oracle import booms
 from studies.clearance.scenes import treated, with_play
 from studies.stops import StopMotion, halt
 
 from boom_twin import load_scene
-from boom_twin.analysis.balances import Momenta, energy_balance, momentum_balance
 from boom_twin.analysis.simulate import course_of
 
 SCENE = load_scene()

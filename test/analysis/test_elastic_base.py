@@ -7,13 +7,13 @@ import json
 import numpy as np
 import pytest
 from command import main
+from convergence.balances import energy_balance, momentum_balance
 from default_boom import anew, motion_of, strokes_of_posture
 from oracle import booms
 from oracle.clearance.scenes import with_pins
 from oracle.oscillation import mean_frequency
 
 from boom_twin import load_scene, simulate, statics
-from boom_twin.analysis.balances import energy_balance, momentum_balance
 from boom_twin.analysis.simulate import course_of
 
 STIFFNESS, DAMPING = 5.0e6, 5.0e4  # N m/rad, N m s/rad
@@ -45,14 +45,14 @@ def test_rest_and_stop_are_those_of_exudyn():
     resting, found = rig.at_rest(SCENE, strokes, 8, nodally_exact=True), statics(SCENE, strokes)
     drive = rig.Programme(tuple(strokes), (rig.Move(0, 0.1, 0.5, strokes[0] + 0.03),))
     rows, _ = rig.move(resting, drive, 2.0, 1e-3, 1e-3)
-    moved = simulate(SCENE, rows["t_s"], drive(rows["t_s"])[0], dt=1e-3)
-    tip = np.column_stack([rows["tip_x_m"], rows["tip_y_m"]])
+    moved = simulate(SCENE, rows["t"], drive(rows["t"])[0], dt=1e-3)
+    tip = rows["tip"]
     assert np.abs(found.tip - tip[0]).max() < 1e-3 * np.hypot(*(found.tip - found.tip_rigid))
-    assert found.joints == pytest.approx([rows[f"joint_{i}_rad"][0] for i in range(1, 5)], abs=1e-5)
-    assert found.cylinder_forces == pytest.approx(resting.forces, rel=1e-4)
-    assert np.ptp(tip[rows["t_s"] > 0.5, 1]) > 0.3
+    assert found.joints == pytest.approx(rows["joints"][0], abs=1e-5)
+    assert found.cylinder_forces == pytest.approx(resting.rows["forces"][0], rel=1e-4)
+    assert np.ptp(tip[rows["t"] > 0.5, 1]) > 0.3
     assert np.linalg.norm(moved.tip[:, :2] - tip, axis=1).max() < 1e-3
-    assert moved.joints[:, 0] == pytest.approx(rows["joint_1_rad"], abs=2e-5)
+    assert moved.joints[:, 0] == pytest.approx(rows["joints"][:, 0], abs=2e-5)
 
 
 def test_first_frequency_is_that_of_exudyn():
@@ -61,8 +61,8 @@ def test_first_frequency_is_that_of_exudyn():
     scene, strokes = booms.on_elastic_base(RIGID, STIFFNESS), strokes_of_posture(SCENE, "arch")
     drive = rig.Programme(tuple(strokes), (rig.Move(0, 0.0, 1.2, strokes[0] + 2e-3),))
     rows, _ = rig.move(rig.at_rest(scene, strokes, 6, nodally_exact=True), drive, 14.0, 4e-3, 4e-3)
-    free, first = rows["t_s"] > 3.0, statics(scene, drive(np.array([2.0]))[0][0], modes=1).frequencies[0]
-    assert mean_frequency(rows["t_s"][free], rows["tip_y_m"][free]) == pytest.approx(first, rel=1e-3)
+    free, first = rows["t"] > 3.0, statics(scene, drive(np.array([2.0]))[0][0], modes=1).frequencies[0]
+    assert mean_frequency(rows["t"][free], rows["tip"][:, 1][free]) == pytest.approx(first, rel=1e-3)
     assert first == pytest.approx(0.942 * statics(RIGID, posture="arch", modes=1).frequencies[0], rel=5e-3)
 
 

@@ -11,7 +11,7 @@ from scipy.linalg import eigh, null_space
 
 from boom_twin import SolverError, load_scene, statics
 from boom_twin.analysis.modal import damping_ratio, natural_modes
-from boom_twin.validation.study import scene_changes as made
+from boom_twin.validation.study import scenes as made
 
 CASES = [pytest.param(load_scene(), "arch", id="default"), pytest.param(booms.random_boom(28), "test", id="boom 28")]
 

@@ -198,7 +198,7 @@ def bomb(file: Path, content: bytes, compression: str, crc: int) -> Path:
 def test_recovery_of_a_bomb_takes_little_memory(tmp_path: Path, compression: str, is_summed: bool) -> None:
     zeros = bytes(LARGEST_SUMMARY)
     path = bomb(tmp_path / "bomb.mcap", zeros, compression, zlib.crc32(zeros) if is_summed else 0)
-    words = refused_in_little_memory(tmp_path, "recover", path, "--out", tmp_path / "out", "--unverified")
+    words = refused_in_little_memory(tmp_path, "recover", path, "--out", tmp_path / "out")
     assert "there is none" in words
     assert not (tmp_path / "out").exists()
 

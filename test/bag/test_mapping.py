@@ -14,8 +14,7 @@ from ros_messages import load_topics
 
 from boom_twin import BagError, Stream, UsageError
 from boom_twin.bag.metadata import dump
-from boom_twin.bag.session_model import strokes_of
-from boom_twin.bag.session_sheet import RIG_ORIGIN
+from boom_twin.bag.session_model import RIG_ORIGIN, strokes_of
 from boom_twin.messages.topic_table import DEFAULT_FILE
 from boom_twin.types import StrokeReading
 

@@ -16,9 +16,8 @@ from command import main
 from recordings import TRUTH, load_truth, mapping_of, recover, scan
 
 from boom_twin import BagError
-from boom_twin.report.compare import side_of
 from boom_twin.report.quantities import FILE_NAME as QUANTITIES
-from boom_twin.report.quantities import read
+from boom_twin.report.quantities import read, side_of
 from boom_twin.system.received_files import open_received
 
 MCAP, METADATA, SHEET, SUMMARY = "session_0.mcap", "metadata.yaml", "session.yaml", "summary.json"

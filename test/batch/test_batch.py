@@ -24,7 +24,7 @@ pytest.importorskip("distributed")
 from command import main  # noqa: E402
 
 from boom_twin import replay  # noqa: E402
-from boom_twin.system.child_process import python_command  # noqa: E402
+from boom_twin.system.processes import python_command  # noqa: E402
 
 COUNT = 5
 PATIENCE = 300.0

@@ -15,7 +15,7 @@ from recordings import write_session
 from scipy import stats
 from session_readings import rows_in
 
-from boom_twin.batch.rigs import rigs_of
+from boom_twin.batch.results import rigs_of
 
 parquet = pytest.importorskip("pyarrow.parquet")
 DAY = 86_400 * 10**9

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from boom_twin import UsageError
-from boom_twin.batch.sources import fingerprint, key_of, sessions_of
+from boom_twin.batch.folder import fingerprint, key_of, sessions_of
 
 
 @pytest.fixture

@@ -24,10 +24,10 @@ from record import keep
 
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.access_control import AccessControl
-from boom_twin.monitor.actions import ViewerActions
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.server import Server
+from boom_twin.monitor.viewer import ViewerActions
 
 RATE = 200
 CHROMIUM = Path("/usr/bin/chromium")

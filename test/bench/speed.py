@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from boom_twin import load_scene, replay
-from boom_twin.analysis.methods import integrate_with
-from boom_twin.analysis.motions import motion_of
+from boom_twin.analysis.methods import integrate_with, motion_of
 from boom_twin.offline.replay import Replay
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.validation.study.error.problem import ROW, at_rest, every, load_rig
+from boom_twin.validation.study.error_runs import ROW, at_rest, every, load_rig
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 SPAN, STEP = 4.0, 1e-3

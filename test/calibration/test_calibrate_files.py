@@ -52,7 +52,7 @@ def test_a_result_that_does_worse_on_what_was_held_out_is_written_and_refused(so
     """Joint 1 reads 0.01 rad too much in the part that is fitted, and as much too little in the last third."""
     wrong = np.where(np.arange(30 * 200)[:, None] < 20 * 200, 0.01, -0.01) * [1.0, 0.0]
     bag, out = short.write(tmp_path / "bag", 2, zeros=wrong), tmp_path / "new.yaml"
-    options = ["--scene", str(source), "--parameters", "joint_1.zero", "--no-pictures"]
+    options = ["--scene", str(source), "--parameters", "joint_1.zero"]
     assert main(["calibrate", str(bag), *options, "--out", str(out)]) == 1
     assert "residuals of joint_1 have grown: do not use this result" in capsys.readouterr().err and out.is_file()
 
@@ -66,9 +66,8 @@ def test_the_new_scene_keeps_comments_and_tells_where_it_is_from(ran, source, sh
     before = "Before: cylinder_1.k 4e+07 N/m, cylinder_2.k 3e+07 N/m."
     for part in ("from bag (sha256 ", "held out: the last third of bag", before):
         assert part in scene.description
-    added, removed = set(new.splitlines()) - set(old.splitlines()), set(old.splitlines()) - set(new.splitlines())
-    assert len(removed) == 3 and all("k:" in line or "description" in line for line in removed)
-    assert all("k:" in line or line.startswith("  ") or "description" in line for line in added)
+    comments = [{line.partition("#")[2] for line in text.splitlines() if "#" in line} for text in (old, new)]
+    assert len(comments[0]) > 3 and comments[0] <= comments[1]
 
 
 def test_zeros_go_into_a_mapping_that_a_replay_takes(ran, source):
@@ -77,7 +76,7 @@ def test_zeros_go_into_a_mapping_that_a_replay_takes(ran, source):
     assert sensors["joint_1"].zero == pytest.approx(2e-3, abs=2e-4)
     assert "cylinder_1" not in sensors
     arguments = ["replay", str(folder / "bag"), "--scene", str(folder / "new.yaml"), "--out", str(folder / "replay")]
-    assert main([*arguments, "--mapping", str(folder / "new.mapping.yaml"), "--no-pictures"]) == 0
+    assert main([*arguments, "--mapping", str(folder / "new.mapping.yaml")]) == 0
     summary = json.loads((folder / "replay" / "summary.json").read_text())
     assert np.abs(summary["joint_residual_normalised_mean"]).max() < 0.3
 
@@ -95,7 +94,7 @@ def test_no_scene_is_written_without_its_zeros(ran, capsys, tmp_path, monkeypatc
     _, arguments, calibrated = ran
     monkeypatch.setattr(run, "calibrate", lambda *given: calibrated)
     (tmp_path / "new.mapping.yaml").mkdir()
-    assert main([*arguments, "--out", str(tmp_path / "new.yaml"), "--force", "--no-pictures"]) == 1
+    assert main([*arguments, "--out", str(tmp_path / "new.yaml"), "--force"]) == 1
     assert "new.mapping.yaml: cannot be written" in capsys.readouterr().err
     assert not (tmp_path / "new.yaml").exists()
 
@@ -108,7 +107,7 @@ def test_a_file_that_comes_while_it_works_is_kept(ran, capsys, tmp_path, monkeyp
         return calibrated
 
     monkeypatch.setattr(run, "calibrate", calibrate_meanwhile)
-    assert main([*arguments, "--out", str(tmp_path / "new.yaml"), "--no-pictures"]) == 1
+    assert main([*arguments, "--out", str(tmp_path / "new.yaml")]) == 1
     assert "is there already. Name another file" in capsys.readouterr().err
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("new.yaml", "mine")]
 
@@ -117,7 +116,7 @@ def test_json_is_one_flat_object_and_goes_on_from_a_mapping(ran, capsys, tmp_pat
     _, arguments, _ = ran
     (tmp_path / "own.yaml").write_text("sensors:\n  joint_1: {zero: 0.1, unit: deg, scale: 57.29577951308232}  # mine\n")
     out = tmp_path / "again.yaml"
-    arguments = [*arguments, "--mapping", str(tmp_path / "own.yaml"), "--out", str(out), "--json", "--no-pictures"]
+    arguments = [*arguments, "--mapping", str(tmp_path / "own.yaml"), "--out", str(out), "--json"]
     assert main(arguments) == 0
     told = json.loads(capsys.readouterr().out)
     assert not any(isinstance(value, dict) for value in told.values())

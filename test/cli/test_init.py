@@ -65,10 +65,8 @@ def test_a_warned_table_is_mended_and_written_anew(table: str, capsys: pytest.Ca
         ("table.yaml", b"", ["table file = "]),
         ("table.yaml", b"base: {pivot: [0, 0]}\nsections: []\n", ["base.cylinder_pin is absent", "sections"]),
         ("table.yaml", default_text().encode(), ["1 fault", "gravity = [0.0, -9.81]: only a scene has it"]),
-        ("table.csv", b"length,height\n8.3,0.56\n", ["sections[0].wall is absent"]),
-        ("table.csv", b"PK\x03\x04\x14\x00\xff\xfe", ["Save a spreadsheet as `CSV UTF-8`."]),
-        ("table.csv", "length\nGroßer\n".encode("latin-1"), ["line 2 has a character that is not UTF-8, byte 0xdf"]),
-        ("table.csv", b"\xff\xfel\x00e\x00", ["this is not a text file in UTF-8"]),
+        ("table.yaml", b"PK\x03\x04\x14\x00\xff\xfe", ["line 1 has bytes that are no text in UTF-8"]),
+        ("table.yaml", "length\nGroßer\n".encode("latin-1"), ["line 2 has bytes that are no text in UTF-8"]),
     ],
 )
 def test_what_is_no_table_is_refused_by_what_it_is(

@@ -55,7 +55,7 @@ def test_section_angles_are_a_posture(posture: str, capsys: pytest.CaptureFixtur
     strokes = ",".join(map(str, found["stroke_m"]))
     assert main(["statics", "--strokes", strokes, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["tip_m"] == pytest.approx(found["tip_m"], abs=1e-9)
-    assert main(["response", "--posture", posture.strip(), "--tip", "-100,0", "--points", "3", "--json"]) == 0
+    assert main(["response", "--posture", posture.strip(), "--tip", "-100,0", "--json"]) == 0
 
 
 def test_quiet_leaves_out_what_is_no_result_and_no_failure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

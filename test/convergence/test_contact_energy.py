@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from convergence.balances import Energies
 from default_boom import posture_angles, strokes_of_posture
 from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
 
-from boom_twin.analysis.balances import Energies
 from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO

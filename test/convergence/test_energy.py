@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from convergence import motions
+from convergence.balances import energy_balance
 from default_boom import posture_angles, strokes_of_posture
 from oracle import booms
 
-from boom_twin.analysis.balances import energy_balance
 from boom_twin.analysis.simulate import course_of
 
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TextIO
 from boom_twin import BoomTwinError
 from boom_twin.bag.async_writer import PATIENCE as DISK_PATIENCE
 from boom_twin.ros.startup import STOPS, on_stop_signal
-from boom_twin.system.child_process import end_process, python_command
+from boom_twin.system.processes import end_process, python_command
 
 from .isolation import isolated
 

@@ -14,7 +14,7 @@ from default_boom import strokes_of_posture
 from boom_twin import load_scene, simulate
 from boom_twin.types import SECOND
 from boom_twin.validation.rig.motion import Move, Programme, ease
-from boom_twin.validation.rig.sensors import Sensors, read, sampling_stamps
+from boom_twin.validation.rig.session import Sensors, read, sampling_stamps
 
 SECONDS = 12.0
 POSTURE = "arch"

@@ -7,7 +7,7 @@ import pytest
 from default_boom import strokes_of_posture
 
 from boom_twin import Sample, Stream, Twin, load_scene, statics
-from boom_twin.twin.blocks import ReportBlock, block_of
+from boom_twin.twin.blocks import block_of
 from boom_twin.types import SECOND, Array
 
 SCENE = load_scene()
@@ -67,8 +67,7 @@ def test_a_block_of_samples_gives_what_they_give_one_by_one() -> None:
     given = samples(times, angles_of(times, amplitude), amplitude, -0.02, 5e-5)
     one, other = (Twin(SCENE, lagging=[Stream.ANGLES]) for _ in range(2))
     singles = [one.update(each) for each in given]
-    blocks = [block for k in range(0, len(given), 37) for block in other.update_block(block_of(given[k : k + 37], 4))]
-    reports = [each for block in blocks for each in (block.reports(4) if isinstance(block, ReportBlock) else [block])]
+    reports = [each for k in range(0, len(given), 37) for each in other.take(block_of(given[k : k + 37], 4)).reports(4)]
     assert len(singles) == len(reports) and one.clocks == other.clocks and one.clocks[Stream.ANGLES].lag < -0.01
     for left, right in zip(singles, reports, strict=True):
         assert (left.estimate is None) == (right.estimate is None)

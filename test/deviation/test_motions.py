@@ -16,8 +16,7 @@ def followed(session, **options):
     """A twin that has followed the strokes of a session, and what it predicted."""
     twin, recording = Twin(load_scene(), **options), Recording(4)
     block = SampleBlock(np.zeros(len(session.stamps), np.int64), session.stamps, session.strokes)
-    for part in twin.update_block(block):
-        recording.add(part)
+    recording.add(twin.take(block), block)
     return twin, recording.whole.predictions
 
 

@@ -14,7 +14,7 @@ from ros_messages import SampleDecoder, new_message
 from ruamel.yaml import YAML
 
 from boom_twin import Sample, Scene, Settings, Stream, Twin, UsageError, load_scene, statics
-from boom_twin.analysis.bending_moments import stations
+from boom_twin.analysis.bending_stress import stations
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.deviation.states import PREDICTION, drive_place
 from boom_twin.deviation.step import move_sites, place_live

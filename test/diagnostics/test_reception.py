@@ -9,8 +9,7 @@ import pytest
 
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
-from boom_twin.diagnostics.recorder_status import DiskState, TopicCount, recording_status
-from boom_twin.diagnostics.topic_status import Reception, ReceptionWatch
+from boom_twin.diagnostics.topic_status import DiskState, Reception, ReceptionWatch, TopicCount, recording_status
 
 
 def begun(judge: ComponentJudge, now: float = 0.0) -> ComponentJudge:
@@ -20,7 +19,7 @@ def begun(judge: ComponentJudge, now: float = 0.0) -> ComponentJudge:
 def received(*looks: Reception) -> Status:
     """Return the state after looks that are two seconds apart."""
     watch, judge = ReceptionWatch(), ComponentJudge("reception")
-    return [watch.status(begun(judge, 2.0 * k), {"cylinder_strokes": each}, {}) for k, each in enumerate(looks)][-1]
+    return [watch.status(begun(judge, 2.0 * k), {"cylinder_strokes": each}) for k, each in enumerate(looks)][-1]
 
 
 def test_messages_that_never_arrive_give_way_or_wait() -> None:
@@ -37,14 +36,6 @@ def test_messages_that_never_arrive_give_way_or_wait() -> None:
     anew = received(Reception(1000, 0, 900), Reception(2000, 0, 1800), Reception(10, 0, 0, 0, 0.001))
     assert anew.values["cylinder_strokes unread_share"] == 0.0
     assert "unknown" in str(received(Reception(10, is_numbered=False)).values["cylinder_strokes lost"])
-
-
-def test_what_is_left_out_is_told_at_once_and_only_what_is_new() -> None:
-    watch, judge = ReceptionWatch(), ComponentJudge("reception")
-    found = [watch.status(begun(judge, 10.0 * k), {}, {"shapes": count}) for k, count in enumerate((0, 7, 7, 7))]
-    assert [status.level for status in found] == [Level.OK, Level.WARN, Level.OK, Level.OK]
-    assert found[1].message == "too many messages for the time there is: shapes left out, predictions complete"
-    assert [status.values["shapes left_out"] for status in found] == [0, 7, 0, 0]
 
 
 LATE = "messages wait too long to be written to the disk"

@@ -9,8 +9,7 @@ import pytest
 
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import Bounds, ComponentJudge, Evaluation, Hysteresis, Level
-from boom_twin.diagnostics.sensor_status import SensorSpec, sensor_status
-from boom_twin.diagnostics.stream_stats import Channel, ChannelStats
+from boom_twin.diagnostics.sensor_status import Channel, ChannelStats, SensorSpec, sensor_status
 from boom_twin.texts import alarm_text
 
 SECOND = 1_000_000_000

@@ -18,7 +18,7 @@ from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Stat
 from boom_twin.diagnostics.model_status import stress_model, stress_status
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
-from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
+from boom_twin.diagnostics.twin_status import TwinWatch
 from boom_twin.twin.blocks import estimate_of
 from boom_twin.types import USUAL_STREAMS, Residuals
 
@@ -51,7 +51,7 @@ class Rig:
         return self.look()
 
     def look(self) -> dict[str, Status]:
-        found = all_pieces(self.watch.look({"scene": "s"}, "", self.peers, [Peers("/out", ("/screen",))], self.now + 1e9))
+        found = self.watch.look({"scene": "s"}, "", self.peers, [Peers("/out", ("/screen",))], self.now + 1e9)
         return {status.name: status for status in found}
 
     def _message(self, stream: Stream) -> None:
@@ -145,7 +145,7 @@ def test_strokes_that_give_no_prediction_are_an_error_with_what_is_wrong_with_th
             rig._message(Stream.STROKES)
         words = {"leap": "far from where it was", "late": "late"}
         counts = {"scene": "s", "samples: leap": leaps, "samples: late": 7}
-        return all_pieces(rig.watch.look(counts, "", rig.peers, [], rig.now + 1e9, words=words))[0]
+        return rig.watch.look(counts, "", rig.peers, [], rig.now + 1e9, words=words)[0]
 
     after(rig, 2)
     assert look(3).level == Level.OK
@@ -187,7 +187,7 @@ def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() ->
 def test_the_sources_of_pressures_are_watched_by_the_forces_that_they_give(rig: Rig) -> None:
     rig.second((Stream.STROKES, Stream.ANGLES, Stream.FORCES))
     rig.peers[Stream.PRESSURES] = Peers("/cylinder_pressures", ("/valves", "/bridge"))
-    found = all_pieces(rig.watch.look({}, "", rig.peers, [Peers("/out", ("/screen",))], rig.now + 1e9, {}))
+    found = rig.watch.look({}, "", rig.peers, [Peers("/out", ("/screen",))], rig.now + 1e9, {})
     (status,) = (each for each in found if each.name == "publishers")
     values = dict(status.values)
     assert status.level is Level.ERROR and "several publishers of /cylinder_pressures: /valves, /bridge" in status.message

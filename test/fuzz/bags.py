@@ -1,4 +1,4 @@
-"""Target ``bags``: damaged sessions through scan, info, replay and recovery, with and without ``--unverified``.
+"""Target ``bags``: damaged sessions through scan, info, replay and recovery.
 
 A case is a file or folder made of the same messages. Silent is what is read as samples that are not those, from a file whose
 messages are said to be under a checksum; what is saved without a word on what is lacking; what is invented; and anything of a

@@ -59,8 +59,7 @@ def test_sample_by_sample_as_by_blocks():
     single = [report.health for sample in samples for report in one.update(sample).all if report.health is not None]
     found = []
     for first in range(0, len(samples), 997):
-        for each in many.update_block(block_of(samples[first : first + 997], len(scene.joints))):
-            found += list(each.health.values()) if hasattr(each, "predictions") else [x.health for x in each.all if x.health]
+        found += many.take(block_of(samples[first : first + 997], len(scene.joints))).health.values()
     assert [(each.stamp, each.alarms) for each in found] == [(each.stamp, each.alarms) for each in single]
     assert "cylinder_2.k" in {alarm.cause for each in single for alarm in each.alarms}
     assert np.array_equal([each.tip_sigmas for each in found], [each.tip_sigmas for each in single])

@@ -77,7 +77,14 @@ def test_a_load_at_the_tip_above_its_limit_is_told_and_ends() -> None:
     monitor, news = TipLoadMonitor(500.0), list[Alarm]()
     for k in range(200):
         size = (900.0 if 50 <= k < 90 else 400.0) * (k % 5 == 0)
-        news += monitor.take(k * 100_000_000, np.array([0.0, -size]), np.array([1e4, 2500.0]))
+        by_lengths = np.array([0.0, -0.8 * size])
+        news += monitor.take(k * 100_000_000, np.array([by_lengths, [0.0, -size]]), np.array([[1e6, 1e4], [1e4, 2500.0]]))
     began, ended = news
     assert (began.channel, began.cause, began.since, began.until) == ("tip", "tip.load", 5_000_000_000, None)
     assert "900 N (+- 50)" in began.evidence and ended.until == 8_500_000_000 and monitor.alarm is None
+
+
+def test_a_load_that_lengths_contradict_is_no_load() -> None:
+    """The estimate has 900 N, by late readings; lengths alone know that the load is 100 N, within 100 N."""
+    monitor, loads = TipLoadMonitor(500.0), np.array([[0.0, -100.0], [0.0, -900.0]])
+    assert [monitor.take(k * 100_000_000, loads, np.full((2, 2), 1e4)) for k in range(50)] == [[]] * 50

@@ -20,7 +20,7 @@ from boom_twin.bag.session_model import mapping_of, scene_of, strokes_of
 from boom_twin.health.sensor_findings import find
 from boom_twin.health.sensor_survey import summarise, survey
 from boom_twin.offline.session_samples import SessionSamples
-from boom_twin.twin.blocks import ReportBlock, SampleBlock
+from boom_twin.twin.blocks import SampleBlock
 from boom_twin.twin.twin import Twin
 from boom_twin.twin.update import update, write_residual
 
@@ -36,8 +36,7 @@ wanted = [name for name in topics.heard if (found := session.find(name)) is not 
 told = 0
 for item in SessionSamples(session, topics, wanted, 4):
     if isinstance(item, SampleBlock) and told < 3:
-        found = [each for each in twin.update_block(item) if isinstance(each, ReportBlock)]
-        told += sum(len(each.health) for each in found)
+        told += len(twin.take(item).health)
 print(ready, [len(kernel.dispatcher.signatures) for kernel in kernels], told)
 """
 

@@ -20,8 +20,8 @@ def riccati_pass(plan, state, work, motion, drive, drive_rate):
     """One pass of the sweeps over the whole boom: increments into `work.dz`."""
     end = np.int64(len(plan.tables.operations))
     clear_cut(work, FREE)
-    status, _, _ = sweep_in(plan.tables, state, work, motion, drive, drive_rate, ROOT, end, FREE, work.condensed)
-    sweep_out(plan.tables, state, work, work.condensed, ROOT, end, FREE)
+    status, _, _ = sweep_in(plan.tables, state, work, motion, drive, drive_rate, ROOT, end, FREE)
+    sweep_out(plan.tables, state, work, ROOT, end, FREE)
     return status
 
 

@@ -13,7 +13,7 @@ from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.integrators import GENERALISED_ALPHA, HAT, OFFSET, OLD, prepare
 from boom_twin.kernels.tables import Motion
 from boom_twin.kernels.transfer.time_step import advance
-from boom_twin.validation.study.long_booms import long_boom
+from boom_twin.validation.study.scenes import long_boom
 
 STEP, RHO, STEPS = 1e-3, 0.8, 20
 LENGTH = 20.0  # m, of every boom

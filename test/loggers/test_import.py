@@ -17,7 +17,7 @@ from ros_messages import stamp_of
 from ruamel.yaml import YAML
 
 from boom_twin import Sample, Stream, load_scene, replay, statics
-from boom_twin.loggers.column_file import load_columns
+from boom_twin.loggers.assignment import load_columns
 
 STREAMS = {"cylinder_strokes": Stream.STROKES, "joint_angles": Stream.ANGLES, "tip_imu": Stream.IMU}
 

@@ -12,7 +12,7 @@ from drive_twin import drive_twin
 from ros_messages import Output, decoded, stamp_of
 
 from boom_twin import Sample, Stream, load_scene
-from boom_twin.messages.marker_encoder import TRACE, ShapeMarkers, force_colour
+from boom_twin.messages.report_encoder import TRACE, ShapeMarkers, force_colour
 from boom_twin.predictions import Prediction
 
 FACTOR, FULL = 7.5, 5.0e4  # N

@@ -16,7 +16,7 @@ import pytest
 from aiohttp import ClientSession, WSMsgType
 from monitor.conftest import MonitorProcess, monitoring
 
-from boom_twin.monitor import connections
+from boom_twin.monitor import access_control
 from boom_twin.monitor.access_control import POLICY
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
@@ -94,7 +94,7 @@ def test_a_thousand_half_open_connections_keep_no_page_out(server: MonitorProces
                 link.sendall(HALVES[number % len(HALVES)])
         asyncio.run(visit(server))
         open_files = len(list(Path(f"/proc/{server.process.pid}/fd").iterdir()))
-        assert open_files < 2 * connections.MAX_CONNECTIONS + 100
+        assert open_files < 2 * access_control.MAX_CONNECTIONS + 100
         end = time.monotonic() + PATIENCE
         for link in links:  # all are cut off, the newest by their time
             link.settimeout(max(0.1, end - time.monotonic()))

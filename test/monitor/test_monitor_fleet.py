@@ -17,10 +17,10 @@ from monitor.test_monitor_lamps import ERROR
 from monitor.test_monitor_server import Made, serve
 
 from boom_twin.monitor.access_control import AccessControl
-from boom_twin.monitor.actions import ViewerActions
 from boom_twin.monitor.data.feed import Feed
+from boom_twin.monitor.fleet import Webhook
 from boom_twin.monitor.server import Server
-from boom_twin.monitor.webhook import Webhook
+from boom_twin.monitor.viewer import ViewerActions
 from boom_twin.texts import alarm_text
 from boom_twin.types import Alarm
 
@@ -99,7 +99,7 @@ def test_a_silent_feed_gives_no_old_figures(monkeypatch: pytest.MonkeyPatch) -> 
     found = scraped(live)
     assert found["boom_twin_tip_displacement_meters"][label("front", source="predicted", axis="z")] == pytest.approx(-0.2)
     assert found["boom_twin_component_level"][label("front", component="sensor joint_1")] == ERROR
-    monkeypatch.setattr("boom_twin.monitor.metrics.SILENCE", -1.0)
+    monkeypatch.setattr("boom_twin.monitor.fleet.SILENCE", -1.0)
     found = scraped(live)
     assert (
         "boom_twin_tip_displacement_meters" not in found and found["boom_twin_newest_sample_age_seconds"][label("front")] >= 0.0
@@ -160,7 +160,7 @@ def posting(feed: Feed, receiver: Receiver, story: Callable[[TestServer], Awaita
 
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("boom_twin.monitor.webhook.PAUSES", (0.0,) * 3)
+    monkeypatch.setattr("boom_twin.monitor.fleet.PAUSES", (0.0,) * 3)
     monkeypatch.setattr("boom_twin.monitor.server.ALARM_PERIOD", 0.0)
 
 
@@ -207,7 +207,7 @@ def test_it_gives_up_with_a_line_in_the_log(statuses: tuple[int, ...], told: str
 
 @pytest.mark.usefixtures("at_once")
 def test_a_receiver_that_never_answers_does_not_delay_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("boom_twin.monitor.webhook.CLOSING_TIME", 0.0)
+    monkeypatch.setattr("boom_twin.monitor.fleet.CLOSING_TIME", 0.0)
     live = Live()
 
     class Silent(Receiver):

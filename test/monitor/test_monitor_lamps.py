@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from boom_twin.monitor.data.received_messages import DroppedMessages, MalformedError
 from boom_twin.monitor.data.status import MAX_ALARMS, SILENCE, AlarmList, Severity, StatusTable, overall
-from boom_twin.monitor.data.store import Store
+from boom_twin.monitor.data.store import DroppedMessages, MalformedError, Store
 from boom_twin.monitor.protocol import state
 from boom_twin.types import Alarm, Ranked
 
@@ -84,8 +83,6 @@ def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
     judge(alarms, 7.0, replace(unknown, since=7 * 10**9))
     judge(alarms, 8.0)
     assert [(each.begin, each.end) for each in alarms.all] == [(2.0, 5.5), (7.0, 8.0)]
-    alarms.acknowledge_ended()
-    assert all(each.is_acknowledged for each in alarms.all)
 
 
 def test_all_is_not_well_where_messages_were_dropped() -> None:

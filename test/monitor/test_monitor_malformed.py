@@ -18,9 +18,8 @@ from ros_messages import TYPES, Output, Topic, encode_health, jazzy, load_topics
 from boom_twin import Stream
 from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.feed import Feed
-from boom_twin.monitor.data.received_messages import LONGEST_REASON
 from boom_twin.monitor.data.status import MAX_NODES
-from boom_twin.monitor.data.store import Store
+from boom_twin.monitor.data.store import LONGEST_REASON, Store
 from boom_twin.monitor.protocol import dump, layout, state
 from boom_twin.types import Alarm, Health, Ranked
 
@@ -274,7 +273,6 @@ def test_a_burst_of_stamps_costs_no_memory(name: str) -> None:
             bench.send(Output.TIP_ACCELERATION, vector(Output.TIP_ACCELERATION, row % 7), EPOCH + BURSTS[name](row))
             if row % 500 == 499:
                 await analyst.spectrum_at(bench.store.newest)
-                await analyst.spectrogram_between(bench.store.newest - 600.0, bench.store.newest)
 
     tracemalloc.start()
     asyncio.run(look())

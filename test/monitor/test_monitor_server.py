@@ -7,7 +7,6 @@ import json
 import struct
 from collections.abc import Awaitable, Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -18,12 +17,12 @@ from aiohttp.test_utils import TestServer
 from monitor.test_monitor_lamps import ERROR, OK, status
 from ros_messages import load_topics
 
-from boom_twin import BagError, load_scene
+from boom_twin import load_scene
 from boom_twin.monitor.access_control import AccessControl
-from boom_twin.monitor.actions import ViewerActions
-from boom_twin.monitor.data.feed import Feed, SessionList, sessions_in
+from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.server import Server
+from boom_twin.monitor.viewer import ViewerActions
 
 Talk = Callable[[ClientSession, str], Awaitable[None]]
 
@@ -205,7 +204,7 @@ async def ask(url: str, path: str, header: str = "X: y") -> str:
 async def test_nothing_is_done_that_was_not_permitted(feed: Made, session: ClientSession, url: str) -> None:
     async with connect(session, url) as socket:
         assert (await until(socket, "hello"))["permitted"] == []
-        for request in ({"do": "mark", "note": "x"}, {"do": "record", "on": True}, {"do": "acknowledge", "numbers": [1]}):
+        for request in ({"do": "mark", "note": "x"}, {"do": "acknowledge", "numbers": [1]}):
             await socket.send_json(request)
             assert not (await until(socket, "answer"))["done"]
     assert feed.published == []
@@ -237,61 +236,3 @@ async def test_a_recorded_session_is_steered_by_each_viewer_alone(feed: Made, se
         assert rows["times"][-1] == pytest.approx(2.0)
         await other.send_json({"do": "speed", "value": 10.0})
         assert (await until(other, "state", lambda state: state["position"] == 9.0))["is_held"]
-
-
-def server_of(sessions: SessionList) -> Server:
-    return Server(sessions.feed, ViewerActions(sessions.feed, frozenset()), AccessControl("127.0.0.1"), sessions)
-
-
-def test_a_session_that_cannot_be_read_keeps_no_others_out(tmp_path: Path) -> None:
-    """A link to itself, and one that fails as it is read: told, and the next one is shown."""
-    for name in ("b.csv", "c.csv"):
-        (tmp_path / name).touch()
-    (tmp_path / "a.csv").symlink_to("a.csv")
-
-    def opened(path: Path) -> Feed:
-        if path.name == "b.csv":
-            raise BagError(f"{path}: damaged")
-        path.read_bytes()
-        return Made(end=10.0)
-
-    sessions = SessionList(sessions_in(tmp_path), opened)
-    assert (sessions.names, sessions.index) == (["a.csv", "b.csv", "c.csv"], 2)
-    assert "a.csv: cannot be read (Too many levels of symbolic links)" in sessions.feed.trouble
-    assert sessions.feed.trouble.endswith("b.csv: damaged")
-    with pytest.raises(BagError, match=r"a\.csv"):
-        SessionList(sessions_in(tmp_path)[:2], opened)
-
-
-def test_one_of_several_sessions_is_chosen_for_all(tmp_path: Path) -> None:
-    for name in ("a", "b", "c"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "x.mcap").touch()
-    (tmp_path / "s.csv").touch()
-    (tmp_path / "notes").mkdir()
-    assert [path.name for path in sessions_in(tmp_path)] == ["a", "b", "c", "s.csv"]
-    assert sessions_in(tmp_path / "a") == [tmp_path / "a"] and sessions_in(tmp_path / "notes") == [tmp_path / "notes"]
-
-    def opened(path: Path) -> Feed:
-        if path.name == "c":
-            raise BagError(f"{path}: damaged")
-        feed = Made(end=10.0)
-        feed.title = path.name
-        return feed
-
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            hello = await until(socket, "hello")
-            assert (hello["title"], hello["sessions"], hello["session"]) == ("a", ["a", "b", "c", "s.csv"], 0)
-            await socket.send_json({"do": "session", "value": 2})
-            trouble = await until(socket, "state", lambda message: bool(message["trouble"]))
-            assert trouble["trouble"].endswith("c: damaged")
-            await socket.send_json({"do": "session", "value": 1})
-            await closed(socket)
-        async with connect(session, url) as socket:
-            hello = await until(socket, "hello")
-            assert (hello["title"], hello["session"]) == ("b", 1)
-            await socket.send_json({"do": "session", "value": 7})
-            assert await closed(socket) == 1008
-
-    asyncio.run(_serve(server_of(SessionList(sessions_in(tmp_path), opened)), talk))

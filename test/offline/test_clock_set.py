@@ -10,6 +10,7 @@ from drive_twin import drive_twin
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.offline.ground_truth import TipErrors, TipTruth
 from boom_twin.offline.recording import Recording
+from boom_twin.twin.blocks import block_of
 
 MS = 1_000_000
 
@@ -20,12 +21,12 @@ def test_duration_and_errors_go_by_the_time_that_passed(shift):
     scene = load_scene()
     still, twin = strokes_of_posture(scene, "arch"), drive_twin(scene)
     stamps = [1_700_000_000_000 * MS + (5 * k + (shift if k >= 120 else 0)) * MS for k in range(200)]
-    reports = [twin.update(Sample(Stream.STROKES, stamp, still)) for stamp in stamps]
-    position = np.tile(reports[0].prediction.tip_position, (200, 1)) + (np.arange(200) >= 120)[:, np.newaxis]
+    samples = block_of([Sample(Stream.STROKES, stamp, still) for stamp in stamps], 4)
+    rows = twin.take(samples)
+    position = np.tile(rows.predictions.tip_position[0], (200, 1)) + (np.arange(200) >= 120)[:, np.newaxis]
     errors = TipErrors(TipTruth(np.arange(200) * 0.005, position, np.zeros((200, 2)), np.zeros((200, 2))))
     recording = Recording(4, errors=errors)
-    for report in reports:
-        recording.add(report)
+    recording.add(rows, samples)
     recording.close()
     assert len(recording.whole.predictions.stamps) == 200 and len(recording.clock_sets) == 1
     assert recording.duration == pytest.approx(198 * 0.005)  # the one interval in which the clock was set is not known

@@ -59,40 +59,40 @@ def test_the_figures_are_those_of_the_whole(both: tuple) -> None:
     assert [each.value for each in found] == pytest.approx([each.value for each in wanted], rel=1e-6)
 
 
-def blocks(seconds: float) -> list[ReportBlock]:
+def block(seconds: float) -> tuple[ReportBlock, SampleBlock]:
     """What a twin says of the first seconds of the bundled session's true strokes, and angles."""
     truth = np.genfromtxt(ARCH_DRIVES / "truth.csv.gz", delimiter=",", names=True)[: round(200 * seconds)]
     strokes, stamps = np.column_stack([truth[f"stroke_{i}_m"] for i in range(1, 5)]), np.round(truth["t_s"] * 1e9)
     rows, streams = np.repeat(strokes, 2, axis=0), np.tile([CODES[Stream.STROKES], CODES[Stream.ANGLES]], len(strokes))
-    found = drive_twin(load_scene()).update_block(SampleBlock(streams, np.repeat(stamps.astype(np.int64), 2), rows))
-    return [each for each in found if isinstance(each, ReportBlock)]
+    samples = SampleBlock(streams, np.repeat(stamps.astype(np.int64), 2), rows)
+    return drive_twin(load_scene()).take(samples), samples
 
 
-def peak_of(parts: list[ReportBlock], times: int, monkeypatch: pytest.MonkeyPatch) -> tuple[int, Evaluation]:
-    """Peak of memory, bytes, and what comes out of a session that repeats `parts`."""
+def peak_of(part: ReportBlock, samples: SampleBlock, times: int, monkeypatch: pytest.MonkeyPatch) -> tuple[int, Evaluation]:
+    """Peak of memory, bytes, and what comes out of a session that repeats `part`."""
     monkeypatch.setattr(recording, "STRETCH", 2000)
     monkeypatch.setattr(history, "MOST_ROWS", 8192)
-    evaluator = Evaluator(load_scene(), Settings())
+    evaluator = Evaluator(load_scene())
     held = Recording(4, evaluator.add)
     tracemalloc.start()
     for k in range(times):
         shift = k * 10_000_000_000
-        for part in parts:
-            predictions = part.predictions._replace(stamps=part.predictions.stamps + shift)
-            residuals = part.residuals._replace(stamps=part.residuals.stamps + shift)
-            held.add(part._replace(stamps=part.stamps + shift, predictions=predictions, residuals=residuals))
+        predictions = part.predictions._replace(stamps=part.predictions.stamps + shift)
+        residuals = part.residuals._replace(stamps=part.residuals.stamps + shift)
+        shifted = part._replace(stamps=part.stamps + shift, predictions=predictions, residuals=residuals)
+        held.add(shifted, samples._replace(stamps=samples.stamps + shift))
     held.close()
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert held.totals.samples == times * sum(len(part.predictions.stamps) for part in parts)
+    assert held.totals.samples == times * len(part.predictions.stamps)
     return peak, evaluator._history.history(held)
 
 
 def test_memory_does_not_grow_with_the_session(monkeypatch: pytest.MonkeyPatch) -> None:
-    parts = blocks(10.0)
-    (short, _), (long, shown) = (peak_of(parts, times, monkeypatch) for times in (12, 72))
+    part, samples = block(10.0)
+    (short, _), (long, shown) = (peak_of(part, samples, times, monkeypatch) for times in (12, 72))
     assert long < 1.25 * short, f"{long / 1e6:.1f} MB for 12 minutes, {short / 1e6:.1f} MB for 2"
     assert len(shown.stamps_s) < 12_000
-    accelerations = np.concatenate([part.predictions.tip_acceleration for part in parts])
+    accelerations = part.predictions.tip_acceleration
     for extreme in (np.min, np.max):
         assert np.array_equal(extreme(shown.tip_acceleration, axis=0), extreme(accelerations, axis=0))

@@ -57,10 +57,9 @@ def table(folder: Path, stretch: int, monkeypatch: pytest.MonkeyPatch) -> tuple[
     parts, twin, given = Recording(4, take), drive_twin(load_scene()), samples()
     for first in range(0, len(given), 300):
         block = block_of(given[first : first + 300], 4)
-        parts.add_samples(block)
-        for report in twin.update_block(block):
-            parts.add(report)
-            found.add(report)
+        rows = twin.take(block)
+        parts.add(rows, block)
+        found.add(rows, block)
     parts.close()
     assert len(stretches) > 1 or stretch > 2400
     made.finish()

@@ -15,7 +15,7 @@ from recordings import MessageWriter, SessionSheet, scene_of
 from ros_messages import fill_header, load_topics, new_message
 
 from boom_twin import BagError, Settings, Stream, load_scene, replay
-from boom_twin.bag.session_sheet import sha256
+from boom_twin.bag.session_model import sha256
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.scene.load import DEFAULT_NAME
 

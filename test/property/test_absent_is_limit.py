@@ -10,7 +10,7 @@ from oracle import booms
 
 from boom_twin import Scene, statics
 from boom_twin.reduction.deviation import Response, answer, course_of
-from boom_twin.reduction.variants import KINDS, without
+from boom_twin.reduction.search import KINDS, without
 
 SHORT = {"rise": 0.3, "duration": 0.6}
 BEAM_KEYS = ("A", "I")

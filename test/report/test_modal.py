@@ -12,10 +12,11 @@ import pytest
 from command import main
 from default_boom import strokes_of_posture, with_parameters
 
-from boom_twin import Sample, Twin, load_scene, simulate, statics
+from boom_twin import Twin, load_scene, simulate, statics
 from boom_twin.offline.history import HistoryBuilder
 from boom_twin.offline.recording import Recording
 from boom_twin.report.vibration import SHORTEST_REST, RestFinder, course, still, vibrations
+from boom_twin.twin.blocks import CODES, SampleBlock
 from boom_twin.types import SECOND, Array, StrokeReading
 
 TIMES = np.arange(0.0, 5.0, 0.005)
@@ -69,8 +70,9 @@ def test_a_boom_on_locked_drives_rests_with_the_frequencies_of_its_drives(swung,
     scene, found = load_scene(), []
     twin, recording, finder = Twin(scene, reads=reads), Recording(4, found.append, reads=reads), RestFinder(scene)
     rows = {StrokeReading.LENGTH: swung.lengths, StrokeReading.DRIVE: swung.strokes, StrokeReading.ANGLE: swung.joints}[reads]
-    for time, row in zip(swung.times, rows, strict=True):
-        recording.add(twin.update(Sample(reads.stream, SECOND + round(SECOND * float(time)), row)))
+    times = (SECOND + np.round(SECOND * swung.times)).astype(np.int64)
+    block = SampleBlock(np.full(len(times), CODES[reads.stream]), times, rows)
+    recording.add(twin.take(block), block)
     recording.close()
     (stretch,) = found
     finder.add(own := HistoryBuilder(scene).add(stretch), stretch.estimates.load)

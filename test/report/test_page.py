@@ -12,7 +12,8 @@ from health.recorded import written
 from page_outline import outline
 
 from boom_twin import BagError
-from boom_twin.report.quantities import FREQUENCY_ERROR, BatchMeans, PathLength, read
+from boom_twin.report.quantities import FREQUENCY_ERROR, BatchMeans, read
+from boom_twin.scene.load import default_text
 from boom_twin.texts import alarm_text
 
 SESSION = str(Path(__file__).parents[2] / "bags" / "arch_session")
@@ -49,18 +50,14 @@ def test_a_fault_is_named_with_its_time(replays: tuple[Path, Path]) -> None:
     assert began is not None and float(began[1]) == pytest.approx(12.0, abs=1.0)
 
 
-def test_heights_may_be_given(tmp_path: Path) -> None:
-    heights, out = ["--section-height", "0.4,0.3,0.2,0.1"], tmp_path / "out"
+def test_heights_of_the_scene_are_taken(tmp_path: Path) -> None:
+    text = default_text().replace("- {length:", "- {height: 0.3, length:")
+    (tmp_path / "boom.yaml").write_text(text, encoding="utf-8")
+    given, out = ["--scene", str(tmp_path / "boom.yaml")], tmp_path / "out"
     written(tmp_path / "bag", 3.0)
-    assert main(["replay", str(tmp_path / "bag"), "--out", str(out), "--report", "--no-health", *heights]) == 0
-    text = outline(out / "report.html").text
-    assert "Heights as given." in text and "The rig's health was not judged." in text
-
-
-@pytest.mark.parametrize("heights", ["0.4,0.3", "a,b,c,d", "0.4,0.3,0.2,0.0", "0.4,0.3,0.2,nan", ""])
-def test_heights_that_are_none(heights: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", SESSION, "--out", str(tmp_path), "--report", f"--section-height={heights}"]) == 1
-    assert "give 4 heights above 0, in m" in capsys.readouterr().err
+    assert main(["replay", str(tmp_path / "bag"), "--out", str(out), "--report", "--no-health", *given]) == 0
+    found = outline(out / "report.html").text
+    assert "Heights as in the scene." in found and "The rig's health was not judged." in found
 
 
 def test_batch_means_are_as_sure_as_they_say() -> None:
@@ -71,17 +68,6 @@ def test_batch_means_are_as_sure_as_they_say() -> None:
         pair[:] = means.mean
     assert pairs[:, 0].std() == pytest.approx(2.0 / np.sqrt(500), rel=0.2)
     assert pairs[:, 1].mean() == pytest.approx(2.0 / np.sqrt(500), rel=0.2)
-
-
-def test_the_way_of_a_stroke() -> None:
-    """Half a metre out, 0.2 m back, 0.1 m out; the noise of standing still is no way."""
-    random = np.random.default_rng(1)
-    legs_of = [(0.1, 0.1, 500), (0.1, 0.6, 500), (0.6, 0.4, 300), (0.4, 0.5, 300)]
-    way = np.concatenate([np.linspace(*leg) for leg in legs_of])
-    moved, still_ones = PathLength(), PathLength()
-    moved.add(way + random.normal(0.0, 2e-5, len(way)))
-    still_ones.add(np.full(100, 0.3) + random.normal(0.0, 2e-5, 100))
-    assert moved.length == (pytest.approx(0.8, abs=3e-4), 3) and still_ones.length == (0.0, 0)
 
 
 @pytest.mark.parametrize("text", [None, "{", "[]", '{"scene_sha256": "1"}', '{"scene_sha256": "1", "quantities": [{"x": 1}]}'])

@@ -15,8 +15,8 @@ from ros_messages import load_topics, new_message
 from ruamel.yaml import YAML
 
 import boom_twin
-from boom_twin.messages.marker_encoder import ShapeMarkers
-from boom_twin.messages.view_files import RVIZ, VIEWS
+from boom_twin.messages.report_encoder import ShapeMarkers
+from boom_twin.messages.urdf import RVIZ, VIEWS
 
 ROOT = Path(boom_twin.__file__).parent
 LAUNCH = sorted((ROOT / "launch").glob("*.py"))

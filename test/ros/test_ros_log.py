@@ -18,8 +18,8 @@ from std_msgs.msg import UInt8
 from std_srvs.srv import Trigger
 
 from boom_twin.diagnostics.levels import Level, Status
-from boom_twin.ros import runtime
-from boom_twin.ros.diagnostics_publisher import DiagnosticsPublisher
+from boom_twin.ros import receive
+from boom_twin.ros.runtime import DiagnosticsPublisher
 
 HOSTILE = "/rig\x1b[2J\n[INFO] [boom_twin]: all is well\u202e\x9b31m"
 ESCAPED = r"/rig\x1b[2J\n[INFO] [boom_twin]: all is well\u202e\x9b31m"
@@ -39,7 +39,7 @@ def test_states_with_foreign_names_are_escaped(new_rig: Callable[..., Rig], capf
 
 def test_nothing_is_lost_with_a_row_that_is_dropped(domain: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every turn drops the row of the one before; messages and requests stood in it."""
-    monkeypatch.setattr(runtime, "LATE", -1.0)
+    monkeypatch.setattr(receive, "LATE", -1.0)
     node, peer, came, end = rclpy.create_node("turns"), rclpy.create_node("peer"), list[int](), time.monotonic() + 60.0
     qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
     node.create_subscription(UInt8, "number", lambda message: came.append(message.data), qos)
@@ -49,7 +49,7 @@ def test_nothing_is_lost_with_a_row_that_is_dropped(domain: None, monkeypatch: p
         assert time.monotonic() < end
         time.sleep(0.05)
     answers = []
-    with runtime.CallbackTurns(node, lambda: False) as running:
+    with receive.CallbackTurns(node, lambda: False) as running:
         running.poll()
         for number in range(60):
             publisher.publish(UInt8(data=number))

@@ -16,10 +16,9 @@ pytest.importorskip("rclpy")
 import rclpy
 from rclpy.serialization import deserialize_message
 from ros_messages import Output, encode_health, load_topics
-from std_srvs.srv import Trigger
 
-from boom_twin.monitor.actions import AT_NODE, ViewerActions
 from boom_twin.monitor.data.status import Severity
+from boom_twin.monitor.viewer import ViewerActions
 from boom_twin.ros.monitor_feed import TopicFeed
 from boom_twin.ros.runtime import message_class, qos_profile
 from boom_twin.types import Alarm, Health, Ranked
@@ -83,7 +82,7 @@ def pair(domain: None) -> Iterator[tuple[Any, Rig]]:
     rig.node.destroy_node()
 
 
-def test_alarms_come_from_their_topic_and_the_node_lets_go_of_what_ended_with_permission(pair: tuple[Any, Rig]) -> None:
+def test_alarms_come_from_their_topic_and_are_acknowledged_again_when_they_end(pair: tuple[Any, Rig]) -> None:
     feed, rig = pair
     rig.send(Output.TIP_UNCERTAINTY, 5_000_000, lambda message: setattr(message.vector, "z", 0.002))
     until(feed, lambda: "uncertainty" in feed.store.tables)
@@ -94,23 +93,8 @@ def test_alarms_come_from_their_topic_and_the_node_lets_go_of_what_ended_with_pe
     assert (alarm.name, alarm.level, alarm.reason, alarm.end) == ("joint_3", Severity.ERROR, ALARM.told, None)
     assert alarm.causes == (("joint_3.sensor", 0.9), ("cylinder_3.k", 0.1)) and alarm.begin == pytest.approx(0.02, abs=1e-3)
 
-    asked: list[Any] = []
-
-    def acknowledge(request: Any, response: Any) -> Any:
-        asked.append(request)
-        response.success, response.message = True, "joint_3: it jumped"
-        return response
-
-    service = rig.node.create_service(Trigger, "/boom_twin/acknowledge", acknowledge)
-    usual, permitted = ViewerActions(feed, frozenset({"acknowledge"})), ViewerActions(feed, frozenset({AT_NODE}))
-    request = {"do": "acknowledge", "numbers": [alarm.number]}
-    assert usual.act(request)["words"] == permitted.act(request)["words"] == "acknowledged: joint_3"
+    actions, request = ViewerActions(feed, {"acknowledge"}), {"do": "acknowledge", "numbers": [alarm.number]}
+    assert actions.act(request)["words"] == "acknowledged: joint_3" and judged(feed).is_acknowledged
     rig.send(Output.HEALTH, 80_000_000, partial(tell, END))
     until(feed, lambda: judged(feed).end is not None)
-    assert not judged(feed).is_acknowledged and usual.act(request)["words"] == "acknowledged: joint_3"
-    until(feed, feed._asked.service_is_ready)
-    assert permitted.act(request)["words"].endswith("the node was asked to let go of what has ended")
-    released = "let go of by the node: joint_3: it jumped"
-    until(feed, lambda: any(alarm.reason == released for alarm in feed.store.alarms.all), rig)
-    assert len(asked) == 1
-    rig.node.destroy_service(service)
+    assert not judged(feed).is_acknowledged

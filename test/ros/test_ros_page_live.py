@@ -18,11 +18,9 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Vector3Stamped
 from playwright import sync_api
-from recordings import read, scan
+from rcl_interfaces.msg import Log
 from ros_messages import decode_health, load_topics, stamp_of
 
-from boom_twin import load_scene, load_settings
-from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.data.status import LEVELS
 
 CHROMIUM = Path("/usr/bin/chromium")
@@ -41,7 +39,9 @@ class Witness:
         self.health: list[Any] = []
         self.node.create_subscription(Vector3Stamped, "/boom_twin/tip/displacement", self._hear_tip, 5000)
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self.diagnostics.append, 100)
+        self.events: list[str] = []
         self.node.create_subscription(DiagnosticArray, "/boom_twin/health", self.health.append, 100)
+        self.node.create_subscription(Log, EVENTS.absolute, lambda message: self.events.append(message.msg), 100)
 
     def _hear_tip(self, msg: Any) -> None:
         self.tips[stamp_of(msg)] = msg.vector
@@ -69,12 +69,9 @@ class Witness:
 TABLE = "twin.connection.table('displacement')"
 
 
-def test_the_page_shows_what_the_topics_say_and_records_it(
-    spawn: Callable[..., Any], spawn_node: Callable[..., Any], tmp_path: Path
-) -> None:
+def test_the_page_shows_what_the_topics_say_and_marks_it(spawn: Callable[..., Any], spawn_node: Callable[..., Any]) -> None:
     spawn_node().wait_for("active;")
-    folder = tmp_path / "recordings"
-    monitor = spawn("boom_twin.cli.main", "monitor", "--port", "0", "--allow", "mark", "record", "--record-into", str(folder))
+    monitor = spawn("boom_twin.cli.main", "monitor", "--port", "0", "--allow", "mark")
     url = monitor.wait_for("open http").split("open ")[1].split()[0]
     command = [sys.executable, str(LIVE), "source", "200", "1e4", "imu"]
     with sync_api.sync_playwright() as playwright, subprocess.Popen(command, stdout=subprocess.DEVNULL) as source:
@@ -85,7 +82,7 @@ def test_the_page_shows_what_the_topics_say_and_records_it(
             page.goto(url)
             witness = Witness(page)
             shows_what_was_said(page, witness)
-            records(page, witness, folder)
+            publishes_a_mark(page, witness)
         finally:
             browser.close()
             source.kill()
@@ -97,7 +94,7 @@ def shows_what_was_said(page: Any, witness: Witness) -> None:
     witness.until(lambda: len(witness.rows()) > 100)
     for shown, said in witness.rows():
         assert shown == pytest.approx(said, rel=1e-6)
-    page.keyboard.press("5")
+    page.keyboard.press("4")
 
     def level_of(statuses: dict[str, Any], name: str) -> str:
         return LEVELS[statuses[name].level[0]].name if name in statuses else "unknown"
@@ -119,44 +116,13 @@ def shows_what_was_said(page: Any, witness: Witness) -> None:
         )
 
     witness.until(are_the_lamps)
-    page.keyboard.press("7")  # the response in the posture that the node tells: curves of all loads
-    witness.until(lambda: page.evaluate("twin.response.chart?.plot.data.length === 7"))
-    assert page.evaluate("twin.response.chart.plot.data.slice(1, 6).every(row => row.every(v => v > 0))")
+    witness.until(lambda: page.locator("#pump-now span").inner_text().startswith("avoid "))
     page.keyboard.press("1")
 
 
-def records(page: Any, witness: Witness, folder: Path) -> None:
-    """A recording is started, marked and stopped from the page."""
-    record = page.locator("#record")
-    assert record.inner_text() == "● Record"
-    record.click()
-    page.locator("#record", has_text="Stop recording").wait_for()
-    page.locator("#group-recorder[data-level=OK]").wait_for()
-    told = "boom_twin_recorder: recording"
-
-    def received() -> float:
-        states = [each for msg in witness.diagnostics for each in msg.status if each.name == told]
-        values = {pair.key: pair.value for pair in states[-1].values} if states else {}
-        return float(values.get("received /boom_twin/residuals", 0))
-
-    witness.until(lambda: received() > 500)
+def publishes_a_mark(page: Any, witness: Witness) -> None:
     page.keyboard.press("m")
     page.locator("#note-text").fill("hose moved")
     page.keyboard.press("Enter")
     page.locator("#answer", has_text="marked: hose moved").wait_for()
-    before = received()
-    witness.until(lambda: received() > before)
-    record.click()
-    page.locator("#record", has_text="● Record").wait_for()
-    (path,) = folder.iterdir()
-    session = scan(path)
-    counts = {topic.name: topic.count for topic in session.topics}
-    names = ("cylinder_strokes", "joint_angles", "tip_imu", "boom_twin/tip/position", "boom_twin/residuals")
-    assert min(counts[f"/{name}"] for name in names) > 100, counts
-    events = [msg.msg for _, _, msg in read(session, {EVENTS.absolute: EVENTS.type})]
-    assert events == ["mark: hose moved"]
-    feed = bag_feed(path, load_scene(), load_settings(None))
-    feed.poll()
-    while feed.is_reading:
-        feed.poll()
-    assert not feed.trouble and [alarm.reason for alarm in feed.store.alarms.all if alarm.name == "event"] == events
+    witness.until(lambda: "mark: hose moved" in witness.events)

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ros_messages import Qos
 
 pytest.importorskip("rclpy")
 
@@ -22,9 +21,6 @@ from ros_rig import all_stored, spin_until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 
-from boom_twin.bag.advice import publishable
-from boom_twin.bag.metadata import Recorded, offered_qos
-from boom_twin.bag.writer import BagWriter
 from boom_twin.ros.bag.player import CATCH_UP, Player
 from boom_twin.types import SECOND
 
@@ -102,18 +98,3 @@ def test_again_and_again_until_it_is_stopped(spawn: Callable[..., Any], listener
     spin_until(listener, lambda: len(came) > 850)
     assert play.stop(signal.SIGINT) == 0
     assert "s: /tip_imu " in play.said() and "sent in" in play.said()
-
-
-@pytest.mark.parametrize("with_metadata", [True, False])
-def test_quality_of_service_is_that_of_the_session(tmp_path: Path, with_metadata: bool) -> None:
-    qos = Qos(reliability="reliable", durability="transient_local", depth=3)
-    bag = BagWriter(tmp_path / "bag")
-    text = "- reliability: 1\n  durability: 1\n  depth: 3\n  history: 1\n"  # as version 8 has it
-    (key,) = bag.add(
-        Recorded("/map", "std_msgs/msg/String", b"string data\n", {"offered_qos_profiles": text}, offered_qos(qos))
-    )
-    bag.write(key, 1, b"\0\1\0\0\2\0\0\0a\0")
-    bag.close()
-    if not with_metadata:
-        (tmp_path / "bag" / "metadata.yaml").unlink()
-    assert [topic.qos for topic in publishable(scan(tmp_path / "bag"), ["map"])] == [qos]

@@ -1,9 +1,8 @@
-"""A first scene from a table: its numbers against formulas written down here, its checks, both formats, refusals."""
+"""A first scene from a table: its numbers against formulas written down here, its checks, refusals."""
 
 from __future__ import annotations
 
 import math
-import re
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -18,18 +17,12 @@ from boom_twin.scene.first_scene import first_scene
 from boom_twin.scene.oil_spring import middle_stiffness
 
 EXAMPLE = (files("boom_twin") / "msg_config" / "boom_table.yaml").read_text(encoding="utf-8")
-CSV = """length [mm],beam_start [mm],beam_end [mm],height [mm],width [mm],wall [mm],rod_pin_x,rod_pin_y,kind,range_deg_low,\
-range_deg_high,bore [mm],rod [mm],C_x [mm],C_y [mm],D_x [mm],D_y [mm],E_x [mm],E_y [mm],lL [mm],lR [mm],mL,mR,\
-cylinder_pin_x,cylinder_pin_y,pivot_x,pivot_y,pipe,payload
-8300,1320,7800,560,420,8,1.32,-0.264,A,-5,85,180,125,,,,,,,,,,,0.99,-2.75,0,0,25,60
-7600,550,7100,450,340,6,,,B1,-165,10,200,120,-1738,544,-362,-55,223,209,974,836,35,28,,,,,25,
-""".replace("\\\n", "")
 
 
-def scene_of(folder: Path, text: str, name: str = "table.yaml") -> tuple[str, Scene, list[Any]]:
-    path = folder / name
+def scene_of(folder: Path, text: str) -> tuple[str, Scene, list[Any]]:
+    path = folder / "table.yaml"
     path.write_text(text, encoding="utf-8")
-    return first_scene(*read_table(path), name)
+    return first_scene(*read_table(path), "table.yaml")
 
 
 def test_what_is_worked_out_is_what_the_formulas_give(tmp_path: Path) -> None:
@@ -57,17 +50,6 @@ def test_cylinders_cover_the_range_and_postures_are_in_it(tmp_path: Path) -> Non
         assert 0.96 * joint.cylinder.max_stroke < strokes.max() < joint.cylinder.max_stroke
     assert list(scene.postures) == ["stretched", "middle"]
     assert scene.postures["stretched"] == (0.0, 0.0, 0.0, 0.0)
-
-
-def test_a_csv_table_says_the_same_as_yaml(tmp_path: Path) -> None:
-    _, scene, oddities = scene_of(tmp_path, CSV, "table.csv")
-    _, whole, _ = scene_of(tmp_path, EXAMPLE)
-    assert oddities == []
-    assert scene.base == whole.base and scene.tip == whole.tip
-    for i in range(2):
-        assert scene.sections[i].model_copy(update={"beta": 0}) == whole.sections[i].model_copy(update={"beta": 0})
-        drives = [each.joints[i].cylinder.model_copy(update={"d": 0}) for each in (scene, whole)]
-        assert drives[0] == drives[1]
 
 
 @pytest.mark.parametrize(
@@ -129,12 +111,3 @@ def test_a_slip_in_the_table_is_warned_of_where_it_is(tmp_path: Path, old: str, 
     oddities = scene_of(tmp_path, EXAMPLE.replace(old, new))[2]
     told = [str(oddity) for oddity in oddities if oddity.path == path]
     assert len(told) == 1 and words in told[0] and len(oddities) <= 4, [str(oddity) for oddity in oddities]
-
-
-def test_a_spreadsheet_s_warnings_and_faults_name_its_cells(tmp_path: Path) -> None:
-    rows = CSV.splitlines()
-    spaced = "\n".join([rows[0], rows[1], ",,,", rows[2].replace("7100", "6550")])  # the empty row counts in the spreadsheet
-    (oddity,) = scene_of(tmp_path, spaced, "table.csv")[2]
-    assert str(oddity).startswith("line 4: sections[1].beam (cells B4, C4) = [0.55, 6.55]")
-    with pytest.raises(SceneError, match=re.escape("line 3: sections[1].wall (cell F3) = 6.0: two walls fill")):
-        scene_of(tmp_path, CSV.replace("wall [mm]", "wall").replace("420,8", "420,0.008"), "table.csv")

@@ -160,17 +160,24 @@ def test_joints_have_their_kinds_in_order_and_are_as_many_as_sections(bench: Any
     assert (fault.path, fault.value) == ("joints", 3) and "4 sections" in fault.bound
 
 
-def test_all_faults_are_reported_at_once(bench: Any) -> None:
-    edits = [("material.E", "206e9"), ("sections[0].root.mass", -36), ("sections[1].rho_a", 41), ("sections[2].I", GONE)]
-    edits += [("joints[1].lL", 5.0), ("joints[2].cylinder.k", GONE), ("joints[3].kind", "B9"), ("postures.low", [45, 0])]
-    path = bench.edited(lambda values: [put(values, *each) for each in [*edits, ("clearance", {"joints": []})]])
-    with pytest.raises(SceneError, match="9 faults") as caught:
-        load_scene(path)
-    assert {fault.path for fault in caught.value.faults} == {
-        "material.E", "sections[0].root.mass", "sections[1].rho_a", "sections[2].I", "joints[1].range_deg",
-        "joints[2].cylinder.d", "joints[3].kind", "postures.low", "clearance.joints",
+def test_all_faults_of_a_stage_are_reported_at_once(bench: Any) -> None:
+    """Values by themselves and unknown keys; then keys that need each other; then geometry."""
+    values = [("material.E", "206e9"), ("sections[0].root.mass", -36), ("joints[3].kind", "B9")]
+    unknown = [("sections[1].rho_a", 41), ("clearance", {"joints": []})]
+    keys = [("sections[2].I", GONE), ("joints[2].cylinder.k", GONE), ("postures.low", [45, 0])]
+    geometry = [("joints[1].lL", 5.0), ("joints[3].lL", 5.0)]
+    found = []
+    for edits in (values + unknown + keys + geometry, unknown + keys + geometry, geometry):
+        path = bench.edited(lambda scene, edits=edits: [put(scene, *each) for each in edits])
+        with pytest.raises(SceneError, match="faults") as caught:
+            load_scene(path)
+        assert caught.value.source == str(path)
+        found.append({fault.path for fault in caught.value.faults if not fault.path.startswith("postures.a")})
+    assert found[0] == {"material.E", "sections[0].root.mass", "joints[3].kind", "sections[1].rho_a", "clearance.joints"}
+    assert found[1] == {
+        "sections[1].rho_a", "clearance.joints", "sections[2].I", "joints[2].cylinder.d", "postures.low"
     }  # fmt: skip
-    assert caught.value.source == str(path)
+    assert found[2] == {"joints[1].range_deg", "joints[3].range_deg"}
 
 
 def test_faults_come_with_their_line_in_the_order_of_the_file(bench: Any) -> None:

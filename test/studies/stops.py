@@ -9,7 +9,7 @@ from default_boom import motion_of
 
 from boom_twin import Scene
 from boom_twin.scene.pump_pulses import ease
-from boom_twin.validation.study.stability.cases import FULL_STROKE, ease_integral
+from boom_twin.validation.study.stability_cases import FULL_STROKE, ease_integral
 
 RAMP, STOP = 0.3, 1.0  # s, until full speed; begin of braking
 

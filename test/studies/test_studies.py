@@ -13,7 +13,7 @@ from studies.papers import low_speed
 from studies.roundoff.exact_step import digits, one_step
 
 from boom_twin import load_scene
-from boom_twin.validation.study.long_booms import long_boom
+from boom_twin.validation.study.scenes import long_boom
 
 SCENE = load_scene()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from drive_twin import drive_twin
 from ros_messages import Output, ReportEncoder
 
 from boom_twin import Report, Sample, Settings, Stream, load_scene, statics
-from boom_twin.twin.driver import drive
+from boom_twin.twin.twin import drive
 from boom_twin.types import Change
 
 RATE = 5_000_000  # ns
@@ -29,6 +29,11 @@ def items() -> Iterator[Sample | Change | None]:
         yield Sample(Stream.ANGLES, k * RATE, np.zeros(4))
 
 
+def driven(given: Iterable[Sample | Change]) -> list[Report]:
+    twin = drive_twin(load_scene(), health=True)
+    return [found[1] for found in drive(twin, twin.update, given) if found is not None]
+
+
 def bits(reports: list[Report]) -> list[bytes]:
     """What is predicted and estimated."""
     found = [each for report in reports for each in (report.prediction, report.estimate) if each is not None]
@@ -39,10 +44,7 @@ def test_a_twin_that_began_anew_is_repeated_by_one_that_does() -> None:
     """A node that was started again, or activated again, knew nothing of before; its zeros it has from the change alone."""
     again, anew = (replace(CHANGE, settings=Settings().live, is_new=is_new) for is_new in (False, True))
     samples = [item for item in items() if isinstance(item, Sample)]
-    kept, reports = (
-        [step.report for step in drive(drive_twin(load_scene(), health=True), [*samples[:40], change, *samples[40:]]) if step]
-        for change in (again, anew)
-    )
+    kept, reports = (driven([*samples[:40], change, *samples[40:]]) for change in (again, anew))
     other = drive_twin(load_scene(), health=True)
     other.requests.zero(CHANGE.zeros)
     fresh = [other.update(sample) for sample in samples[40:]]
@@ -72,16 +74,17 @@ def spoilt_samples(seconds: float, noise: float = 1.0) -> Iterator[Sample]:
 def test_health_judged_after_a_sample_was_told_is_the_same() -> None:
     """Every message of the two ways, to the bit; what was told first lacks nothing but the health."""
     whole, apart, encoder = {}, {}, ReportEncoder(load_scene(), Settings())
-    for step in drive(drive_twin(load_scene(), health=True), spoilt_samples(6.0)):
-        for key, data in encoder.fill(step.report):
+    for report in driven(spoilt_samples(6.0)):
+        for key, data in encoder.fill(report):
             whole.setdefault(key, []).append(data)
     twin, told = drive_twin(load_scene(), health=True), set()
-    for step in drive(twin, spoilt_samples(6.0), judged=False):
-        assert step.report.health is None
-        messages = encoder.fill(step.report)
+    for sample in spoilt_samples(6.0):
+        report = twin.update(sample, judged=False)
+        assert report.health is None
+        messages = encoder.fill(report)
         if (health := twin.judge_health()) is not None:
-            assert step.report.prediction is not None
-            messages += encoder.fill(Report(step.sample.stamp, True, health=health))
+            assert report.prediction is not None
+            messages += encoder.fill(Report(sample.stamp, True, health=health))
             told |= {alarm.cause for alarm in health.alarms}
         assert twin.judge_health() is None
         for key, data in messages:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from convergence.balances import states_of
 from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 from session_readings import samples_in
@@ -94,7 +95,7 @@ def motion():
     strokes[:, [0, 2]] += ease(np.clip((times - 3.0) / 3.0, 0.0, 1.0))[:, None] * [0.05, 0.03]
     push = 130.0 * pump_pulses(times, 0.43, 0.1) * ease(np.clip((times - 5.0) / 0.3, 0.0, 1.0))
     course = course_of(SCENE, times, strokes, STEP, force=np.column_stack([np.zeros_like(push), push]))
-    frames = np.array([course.start.frames.copy(), *(state.frames.copy() for _, state in course.states(STEP))])
+    frames = np.array([course.start.frames.copy(), *(state.frames.copy() for _, state in states_of(course, STEP))])
     return course.plan, frames, times
 
 

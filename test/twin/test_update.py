@@ -11,7 +11,7 @@ from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
-from boom_twin.twin.blocks import ReportBlock, SampleBlock, block_of
+from boom_twin.twin.blocks import SampleBlock, block_of
 
 MS, N = 1_000_000, 4
 START = 1_700_000_000_000 * MS
@@ -58,7 +58,6 @@ def told(reports: list[Report]) -> list[tuple[object, ...]]:
         level = None if health is None else (health.stamp, health.alarms, health.tip_sigmas.tobytes())
         said = report.stamp, report.accepted, report.events, report.status, report.change
         found.append((*said, numbers, residuals, level, report.estimate and pickle.dumps(report.estimate)))
-        found += told(list(report.earlier))
     return found
 
 
@@ -70,7 +69,7 @@ def test_blocks_of_any_size_give_what_single_samples_give(seed: int, new: Callab
     mounts = ("root", None, "head", "root") if seed == 1 else ()
     usual = seed < 3
     one, many = (new(load_scene(), Settings(), mounts, usual) for _ in range(2))
-    first, blocks = 0, 0
+    first = 0
     while first < len(samples):
         part = samples[first : first + int(rng.integers(1, 500))]
         if rng.random() < 0.2:
@@ -78,12 +77,10 @@ def test_blocks_of_any_size_give_what_single_samples_give(seed: int, new: Callab
             for twin in (one, many):
                 twin.requests.tune(asked)
                 twin.requests.zero(zeros)
-        found = many.update_block(block_of(part, N))
-        reports = [each for item in found for each in (item.reports(N) if isinstance(item, ReportBlock) else [item])]
-        assert told(reports) == told([one.update(sample) for sample in part])
-        blocks += sum(isinstance(item, ReportBlock) for item in found)
+        reports = many.take(block_of(part, N)).reports(N)
+        assert told(reports) == told([each for sample in part for each in one.update(sample).all])
         first += len(part)
-    assert one.counts == many.counts and blocks
+    assert one.counts == many.counts
     assert seed == 0 or len(one.counts) > 5
 
 
@@ -114,13 +111,5 @@ def test_arrays_of_another_layout_and_kind_are_taken_as_what_they_say() -> None:
     streams = np.zeros(40, np.int64)
     rows = [SampleBlock(streams, stamps, values)]
     others = [SampleBlock(streams.astype(np.int8), np.repeat(stamps, 2)[::2], np.asfortranarray(values))]
-    found = [drive_twin(load_scene()).update_block(block) for blocks in (rows, others) for block in blocks]
-    tips = [np.concatenate([np.atleast_2d(of_tip(each)) for each in reports]) for reports in found]
+    tips = [drive_twin(load_scene()).take(block).predictions.tip_acceleration for (block,) in (rows, others)]
     assert len(tips[0]) == 40 and tips[0].tobytes() == tips[1].tobytes()
-
-
-def of_tip(report: ReportBlock | Report) -> np.ndarray:
-    if isinstance(report, ReportBlock):
-        return report.predictions.tip_acceleration
-    assert report.prediction is not None
-    return report.prediction.tip_acceleration

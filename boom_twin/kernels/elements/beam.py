@@ -9,7 +9,7 @@ rotation. Positions follow by integration along the axis with the cosines and si
 
 Foreshortening, and with it the stiffness that axial load gives or takes (geometric stiffness), is in the cosines; nothing is
 added for it. A part without geometric stiffness has (1, psi.q) in place of cosine and sine. Masses sit at the Gauss points.
-Euler-Bernoulli beams in the floating frame: [Z] in `boom_twin.scene.notation`; the integrated form is derived here.
+Euler-Bernoulli beams in the floating frame: [Z] in `boom_twin.kernels`; the integrated form is derived here.
 """
 
 from __future__ import annotations

@@ -15,12 +15,15 @@ constant force s, d(s.e) = (s.n) n.dd/l and d2(s.e) = -[(s.e) n n^T + (s.n)(e n^
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
-from ..jit import inner
+from ...types import Array
+from ..jit import inner, kernel
 
 BARREL, ROD = 0, 1  # what a part belongs to
+DRIVE_TOLERANCE, DRIVE_PASSES = 1e-13, 60  # change (m) of a drive in the last pass of `write_drives`, most passes
 
 # Places of the ends' x in the cylinder's own system (x_C, y_C, x_R, y_R, N) and among `State.pins`; that of N.
 END_C, END_R, AXIAL = 0, 2, 4
@@ -173,3 +176,20 @@ def _fill(h, i, j, ex, ey, ee, en, nn):
     h[i, j + 1] = mixed
     h[i + 1, j] = mixed
     h[i + 1, j + 1] = ee * ey * ey + 2.0 * en * ex * ey + nn * ex * ex
+
+
+@kernel
+def write_drives(cylinders: Any, oils: Any, forces: Array, lengths: Array) -> None:
+    """Turn lengths (m) of cylinders under `forces` (N), both (k, n), into their drives; NaN if there are none.
+
+    The compliance of `oil` is that at the drive. A pass leaves the share of the error that the oil's pressure is of its bulk
+    modulus, a few percent.
+    """
+    for i in range(cylinders.shape[0]):
+        closed = cylinders[i].closed_length
+        for row in range(lengths.shape[0]):
+            drive, change, passes = lengths[row, i], 1.0, 0
+            while abs(change) >= DRIVE_TOLERANCE and passes < DRIVE_PASSES:
+                change = lengths[row, i] - compliance_and_lag(cylinders[i], oils, closed + drive)[0] * forces[row, i] - drive
+                drive, passes = drive + change, passes + 1
+            lengths[row, i] = drive if abs(change) < DRIVE_TOLERANCE else math.nan

@@ -7,7 +7,7 @@ The journal's centre is offset from the bush's by delta = (x, y). With r = sqrt(
 
 with radial clearance c, speed of approach v at the start of contact, s_i = (1 - nu^2)/E of each body, and radii R_i and
 R_j = R_i + c. K diverges as c vanishes, although the pin becomes ideal. So K uses at least `LEAST_GAP` for R_j - R_i.
-K and the form of F are those of Lankarani and Nikravesh 1990, used in [R] of `boom_twin.scene.notation`. The laws differ in
+K and the form of F are those of Lankarani and Nikravesh 1990, used in [R] of `boom_twin.kernels`. The laws differ in
 chi, a function of the coefficient of restitution. The bracket is at least `LEAST_SHARE`. So contact never pulls, and the
 position of a massless journal stays determined when it leaves. With g' in the bracket the rebound does not depend on the
 smoothing of d. The elastic energy is convex in delta, so a pin at rest has one position.
@@ -33,9 +33,8 @@ from ..jit import inner
 SMOOTH = 1e-6  # m, smoothing length of the onset of contact
 NEAR = 4.0 * SMOOTH  # m, gap below which journal and bush count as touching
 LEAST_GAP = 3e-5  # m, least difference of radii in K
-SLOWEST = 1e-3  # m/s, least speed of approach
-LEAST_RESTITUTION = 0.01  # least restitution for which chi is solved
 LEAST_SHARE = 0.01  # least contact force as a fraction of the elastic force
+SLOWEST = 1e-3  # m/s, least speed of approach
 SLIP = 1e-3  # m/s, slip at which friction has 0.7 of its full size
 
 # Kinds of pins. They are typed because numba compiles again for every literal.
@@ -95,41 +94,22 @@ CLEARANCE = np.dtype(
 CLOSED, APPROACH, FORCE, SPRING, DAMPER, SEAT_X, SEAT_Y, LOST, COLUMNS = range(9)
 
 
-def hertz(restitution: float) -> float:
-    """Return chi of lossless elastic contact: 0 (Hertz 1882)."""
-    return 0.0
-
-
-def lankarani_nikravesh(restitution: float) -> float:
-    """Return chi of nearly elastic contact: 3 (1 - e^2)/4 (Lankarani and Nikravesh 1990)."""
-    return 0.75 * (1.0 - restitution**2)
-
-
-def flores(restitution: float) -> float:
-    """Return chi of elastic to plastic contact: 8 (1 - e)/(5 e) (Flores, Machado, Silva and Martins 2011)."""
-    return 1.6 * (1.0 - restitution) / restitution
-
-
-def hunt_crossley(restitution: float) -> float:
-    """Return chi of hard contact at low speed: 3 (1 - e)/2 (Hunt and Crossley 1975)."""
-    return 1.5 * (1.0 - restitution)
-
-
 def hunt_crossley_exact(restitution: float) -> float:
     """Return the chi for which Hunt and Crossley's force gives exactly this restitution, by `restitution_of`."""
-    wanted, low, high = max(restitution, LEAST_RESTITUTION), 0.0, 1.0
+    wanted, low, high = max(restitution, 0.01), 0.0, 1.0  # below it chi grows without bound
     while restitution_of(high) > wanted:
         low, high = high, 2.0 * high
     return bisect(lambda chi: restitution_of(chi) > wanted, low, high)
 
 
-LAWS = {
-    "hertz": hertz,
-    "lankarani-nikravesh": lankarani_nikravesh,
-    "flores": flores,
-    "hunt-crossley": hunt_crossley,
+LAWS: dict[str, Callable[[float], float]] = {
+    "hertz": lambda e: 0.0,  # lossless elastic contact (Hertz 1882)
+    "lankarani-nikravesh": lambda e: 0.75 * (1.0 - e**2),  # nearly elastic contact (Lankarani and Nikravesh 1990)
+    "flores": lambda e: 1.6 * (1.0 - e) / e,  # elastic to plastic contact (Flores, Machado, Silva and Martins 2011)
+    "hunt-crossley": lambda e: 1.5 * (1.0 - e),  # hard contact at low speed (Hunt and Crossley 1975)
     "hunt-crossley-exact": hunt_crossley_exact,
 }
+"""chi by law, a function of the coefficient of restitution e."""
 
 
 def restitution_of(loss: float) -> float:

@@ -54,7 +54,6 @@ from ..tables import (
 )
 
 ALLOWED = 1e-3  # of the clearance, or of the least one in K: error of a sub-step in an offset
-SIXTH = 1.0 / 6.0
 
 
 @inner
@@ -145,7 +144,7 @@ def end_of(row):
 
 
 @inner
-def condense_ends(t, state, work, condensed, cylinder, g, h):
+def condense_ends(t, state, work, cylinder, g, h):
     """Give the ends of a cylinder that have clearance offsets of their own, and condense them from (g, h).
 
     (g, h) is written for the ends y = (C, R, N), and an end is its pin plus delta. So what `g` and `h` say of that end e holds
@@ -163,8 +162,8 @@ def condense_ends(t, state, work, condensed, cylinder, g, h):
     if torque != 0.0:
         _turn_back(g, h, torque / work.position[cylinder.history])
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
-        at, hold, block = end_of(t.clearances[k]), work.hold[k], condensed.ends[k]
-        gains, free = condensed.end_gains[k], condensed.end_free[k]
+        at, hold, block = end_of(t.clearances[k]), work.hold[k], work.condensed.ends[k]
+        gains, free = work.condensed.end_gains[k], work.condensed.end_free[k]
         block[0, 0], block[0, 1] = h[at, at] + hold[K_XX], h[at, at + 1] + hold[K_XY]
         block[1, 0], block[1, 1] = block[0, 1], h[at + 1, at + 1] + hold[K_YY]
         share = 1.0 / (block[0, 0] * block[1, 1] - block[0, 1] * block[0, 1])
@@ -198,10 +197,10 @@ def _turn_back(g, h, force):
 
 
 @inner
-def move_ends(t, work, condensed, cylinder, cx, cy, rx, ry, force):
+def move_ends(t, work, cylinder, cx, cy, rx, ry, force):
     """Increments of the offsets of a cylinder's ends from those of its pins C and R and of its force."""
     for k in range(cylinder.first_clearance + cylinder.clearances - 1, cylinder.first_clearance - 1, -1):
-        row, gains, free = t.clearances[k], condensed.end_gains[k], condensed.end_free[k]
+        row, gains, free = t.clearances[k], work.condensed.end_gains[k], work.condensed.end_free[k]
         dx = -free[0] - gains[0, 0] * cx - gains[0, 1] * cy - gains[0, 2] * rx - gains[0, 3] * ry - gains[0, 4] * force
         dy = -free[1] - gains[1, 0] * cx - gains[1, 1] * cy - gains[1, 2] * rx - gains[1, 3] * ry - gains[1, 4] * force
         work.dz[row.z], work.dz[row.z + 1] = dx, dy
@@ -232,7 +231,7 @@ def note_contacts(t, state, work):
 
 
 @inner
-def coarseness(t, state, work, condensed, scheme):
+def coarseness(t, state, work, scheme):
     """Largest error of a sub-step in the offset of a pin that touches, over what is allowed.
 
     (1/A - h^2/6) (a' - a) (Zienkiewicz and Xie 1991, with 1/A = beta h^2 for Newmark's family), against `ALLOWED` of the
@@ -242,7 +241,7 @@ def coarseness(t, state, work, condensed, scheme):
     worst, before = 0.0, state.history[A]
     if scheme.gain == 0.0:
         return worst
-    size = abs(1.0 / scheme.gain - SIXTH * scheme.reach * scheme.reach)
+    size = abs(1.0 / scheme.gain - (1.0 / 6.0) * scheme.reach * scheme.reach)
     for k in range(t.clearances.shape[0]):
         row, memory = t.clearances[k], state.contacts[k]
         i, j = row.z, row.z + 1
@@ -252,19 +251,19 @@ def coarseness(t, state, work, condensed, scheme):
         if touching or memory[CLOSED] > 0.0:
             ax = scheme.gain * (state.z[i] - work.hat[i]) - before[i]
             ay = scheme.gain * (state.z[j] - work.hat[j]) - before[j]
-            ax, ay = unstiffened(t, work, condensed, k, ax, ay)
+            ax, ay = unstiffened(t, work, k, ax, ay)
             worst = max(worst, size * math.hypot(ax, ay) / (ALLOWED * max(row.gap, LEAST_GAP)))
     return worst
 
 
 @inner
-def unstiffened(t, work, condensed, k, ax, ay):
+def unstiffened(t, work, k, ax, ay):
     """Return (M A + K)^-1 M A times (ax, ay), with the tangents of a pass for pin `k`: M A + K is what was condensed there."""
     row, hold = t.clearances[k], work.hold[k]
     if row.place >= ROD_END_PIN:
-        xx, xy, yy = condensed.ends[k, 0, 0], condensed.ends[k, 0, 1], condensed.ends[k, 1, 1]
+        xx, xy, yy = work.condensed.ends[k, 0, 0], work.condensed.ends[k, 0, 1], work.condensed.ends[k, 1, 1]
     else:
-        block, at = condensed.blocks[row.owner], row.z - t.joints[row.owner].z
+        block, at = work.condensed.blocks[row.owner], row.z - t.joints[row.owner].z
         xx, xy, yy = block[at, at], block[at + 1, at], block[at + 1, at + 1]
     fx = (xx - hold[K_XX]) * ax + (xy - hold[K_XY]) * ay
     fy = (xy - hold[K_XY]) * ax + (yy - hold[K_YY]) * ay

@@ -10,11 +10,10 @@ and `lead` a number that is raised whenever two passes of a step show more. Pass
 square of the tolerance, which is what a pass with a new tangent would leave, or below a share of what the step itself is off
 by: solving the equations of a long step more exactly makes nothing better. At the usual tolerance of 1e-6 rad that share is a
 thousandth from 14 ms on, and 5e-6 at 1 ms, where no number moves by more than 1e-9 of its range. After a step with more than
-one pass the next begins with a new tangent, and so does a pass where the share would be above `MOST_SHARE`.
+one pass the next begins with a new tangent, and so does a pass where the share would be above 0.15.
 
 Steps of nearly the same length share a tangent, too, so that stamps need not be even: what another gain leaves counts as so
-much more travel. Where less exactness is asked for than usual, for steps that begin anew with every sample, the lead also falls
-to three times what passes show: it is far less than 1 for long steps, whose tangent is mostly stiffness.
+much more travel.
 
 A second-order step takes the acceleration as changing little within it; what its change a' - a moves in the step, (a' - a)/gain
 with 1/gain about a quarter of the step's square, is of the size of the step's own error (Hairer, Norsett and Wanner, Solving
@@ -32,16 +31,6 @@ from ..jit import inner
 from ..tables import CORRECTIONS
 
 LEAD = 4.0  # at first
-MOST_SHARE = 0.15  # of an error that a pass may leave
-CLOSER = 0.1  # of the square of the tolerance, that may be left
-LEAST_ERROR = 1e-15  # rad, that is asked for
-ROUNDING = 0.5  # of the increment before, that one consists of rounding above
-SEEN = 1e-7  # rad, increments from which a share is measured
-EXACT = 2e-6  # rad, a tolerance up to which the lead is never lowered
-NEAR = 1e-3  # rad, added to the travel then: nearer, what passes show is rounding
-SAFE, LEAST_LEAD = 3.0, 0.05  # times the share that passes show; lowest lead
-STEP_SHARE = 1e3  # of a long step's own error, that may be left at a tolerance of 1 rad, and in proportion at a smaller one
-LARGEST_SHARE = 0.005  # of it, at whatever tolerance
 LONG_GAIN = 2e4  # 1/s^2, of a long step: one of 14 ms. Of shorter ones less may be left, by the square of the step
 
 # Of `Work.kept`: gain that the tangent is for, or 0; lead; how many corrections are known; travel after the newest pass.
@@ -63,7 +52,7 @@ def forget_tangent(work):
 @inner
 def may_keep(work, gain):
     """Return True if the kept tangent is good enough for a step of a scheme with `gain`."""
-    near = max(work.kept[SHARE_LEAD], LEAD) * (work.kept[TRAVEL] + detuning(work, gain)) < MOST_SHARE
+    near = work.kept[SHARE_LEAD] * (work.kept[TRAVEL] + detuning(work, gain)) < 0.15  # of an error that a pass may leave
     return near & (work.kept[GAIN] != 0.0)
 
 
@@ -100,12 +89,6 @@ def step_error(t, state, work, gain):
 
 
 @inner
-def is_rough(tolerance):
-    """Return True if the tolerance is larger than usual, so that the lead may fall to what passes show."""
-    return tolerance > EXACT
-
-
-@inner
 def is_converged(t, state, work, size, before, renewed, tolerance, gain):
     """Return True if a pass with an increment of `size` (rad) was the last of a step.
 
@@ -114,14 +97,11 @@ def is_converged(t, state, work, size, before, renewed, tolerance, gain):
     """
     way = work.kept[TRAVEL] = travel(t, state, work)
     way += detuning(work, gain)
-    if is_rough(tolerance):
-        way += NEAR
-    if before > SEEN and way > 0.0:
-        lead, seen = work.kept[SHARE_LEAD], size / before / way
-        work.kept[SHARE_LEAD] = max(max(LEAST_LEAD, 0.5 * lead), SAFE * seen) if is_rough(tolerance) else max(lead, seen)
-    rounding = (size > ROUNDING * before) & (before > 0.0)
-    share = min(STEP_SHARE * tolerance * min(1.0, LONG_GAIN / gain), LARGEST_SHARE)
-    left = max(CLOSER * tolerance * tolerance, LEAST_ERROR, share * step_error(t, state, work, gain))
+    if before > 1e-7 and way > 0.0:  # rad; below it a share is rounding
+        work.kept[SHARE_LEAD] = max(work.kept[SHARE_LEAD], size / before / way)
+    rounding = (size > 0.5 * before) & (before > 0.0)
+    share = 1e3 * tolerance * min(1.0, LONG_GAIN / gain)  # of the step's own error
+    left = max(0.1 * tolerance * tolerance, 1e-15, share * step_error(t, state, work, gain))
     return (work.kept[SHARE_LEAD] * way * size < left) | ((size < tolerance) & (rounding | renewed))
 
 

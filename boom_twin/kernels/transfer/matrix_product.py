@@ -22,7 +22,6 @@ from ..plane_algebra import solve
 from ..tables import DIGITS_LOST, JOINT_B, OK, ROD_PIN, SINGULAR, STATION, Z_FORCE_A, Tables
 from .riccati_sweep import clear_cut, sweep_in, sweep_out
 
-LOST = 1e-6  # ratio of the force left at the free tip to the largest force, above which digits are lost
 THREE, FIVE, SIX, SEVEN = np.int64(3), np.int64(5), np.int64(6), np.int64(7)
 
 
@@ -138,7 +137,7 @@ def plain_pass(t, state, work, motion, drive, drive_rate, product):
             total[i, j] = 1.0 if i == j else 0.0
     for k in range(units - 1, -1, -1):
         open_end(work, force[k])
-        status, _, _ = sweep_in(t, state, work, motion, drive, drive_rate, bounds[k], bounds[k + 1], SIX, work.condensed)
+        status, _, _ = sweep_in(t, state, work, motion, drive, drive_rate, bounds[k], bounds[k + 1], SIX)
         if status != OK:
             return SINGULAR
         if k > 0:
@@ -163,7 +162,7 @@ def plain_pass(t, state, work, motion, drive, drive_rate, product):
         for j in range(3):
             z[i] += s[3 + i, 3 + j] * right[2 + j, 0]
         force[0, i] = z[3 + i]
-    sweep_out(t, state, work, work.condensed, bounds[0], bounds[1], SEVEN)
+    sweep_out(t, state, work, bounds[0], bounds[1], SEVEN)
     return multiply_out(t, state, work, product)
 
 
@@ -185,6 +184,6 @@ def multiply_out(t, state, work, product):
             z[i] = new[i]
         for i in range(3):
             force[k, i] = z[3 + i]
-        sweep_out(t, state, work, work.condensed, bounds[k], bounds[k + 1], SIX)
+        sweep_out(t, state, work, bounds[k], bounds[k + 1], SIX)
     left = max(abs(z[3]), abs(z[4]), abs(z[5]))
-    return OK if left <= LOST * largest else DIGITS_LOST
+    return OK if left <= 1e-6 * largest else DIGITS_LOST  # nothing acts at the free tip

@@ -48,10 +48,10 @@ def transfer_body(t, work, motion, row, c, sn):
 
 
 @inner
-def beam_operation(t, state, work, condensed, motion, row, operation, c, sn, m):
+def beam_operation(t, state, work, motion, row, operation, c, sn, m):
     """Transfer the cut through beam part `row` and keep its gains. Return the number of negative pivots or -1."""
     beam, part, s, p = t.beams[row], beam_part(t, work, row), work.s, work.p
-    gains, factors, free = condensed.gains[operation], condensed.factors[operation], condensed.free[operation]
+    gains, factors, free = work.condensed.gains[operation], work.condensed.factors[operation], work.condensed.free[operation]
     if is_usual(beam):
         own = BeamEquations(gains, factors, free, USUAL_LOCAL(p))
         return transfer_beam(beam, part, USUAL, own, state.z, c, sn, motion, t.gravity, work.position, s, p, m)
@@ -69,17 +69,17 @@ def clear_cut(work, m):
 
 
 @kernel
-def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m, condensed):
+def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
     """Transfer the cut in `work` (m degrees of freedom) inwards, from the end of operation `last - 1` through `first`.
 
-    `condensed` is written for `sweep_out`, `clearance_pins.coarseness` and the count of natural frequencies. Return status
+    `work.condensed` is written for `sweep_out`, `clearance_pins.coarseness` and the count of natural frequencies. Return status
     (OK or SINGULAR), negative pivots of the beams (joints: see `Condensed.blocks`), and the cut's new degrees of freedom.
     """
     s, p, negative = work.s, work.p, 0
     for k in range(last - 1, first - 1, -1):
         kind, row, c, sn = t.operations[k].kind, t.operations[k].row, state.frames[k, FRAME_COS], state.frames[k, FRAME_SIN]
         if kind == BEAM:
-            count = beam_operation(t, state, work, condensed, motion, row, k, c, sn, m)
+            count = beam_operation(t, state, work, motion, row, k, c, sn, m)
             if count < 0:
                 return SINGULAR, negative, m
             negative += count
@@ -96,26 +96,26 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m, condense
             m -= 2
             p[2] -= torque_of(t, work, t.cylinders[t.outlets[row].cylinder], BARREL_END_PIN)
         elif kind == ROD_PIN:
-            m = join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m)
+            m = join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m)
         elif kind == JOINT_B:
-            if not close_loop(t, state, work, condensed, motion, drive, drive_rate, row, k, m):
+            if not close_loop(t, state, work, motion, drive, drive_rate, row, k, m):
                 return SINGULAR, negative, m
             m += 2
-        elif kind == JOINT_A and not close_base(t, work, condensed, motion.renew, k):
+        elif kind == JOINT_A and not close_base(t, work, motion.renew, k):
             return SINGULAR, negative, m
     return OK, negative, m
 
 
 @kernel
-def sweep_out(t, state, work, condensed, first, last, m):
+def sweep_out(t, state, work, first, last, m):
     """Write the increments to ADD to the unknowns of operations `first` .. `last - 1` into `work.dz`.
 
-    The cut before them has m degrees of freedom in `work.cut`. `condensed` is from `sweep_in`.
+    The cut before them has m degrees of freedom in `work.cut`. `work.condensed` is from `sweep_in`.
     """
     cut, dz = work.cut, work.dz
     for k in range(first, last):
         kind, row, c, sn = t.operations[k].kind, t.operations[k].row, state.frames[k, FRAME_COS], state.frames[k, FRAME_SIN]
-        gains, free = condensed.gains[k], condensed.free[k]
+        gains, free = work.condensed.gains[k], work.condensed.free[k]
         if kind == BEAM:
             out_beam(t.beams[row], beam_part(t, work, row), gains, free, c, sn, m, cut, dz)
         elif kind == OFFSET:
@@ -137,9 +137,9 @@ def sweep_out(t, state, work, condensed, first, last, m):
             m -= 1
             bx, by = t.outlets[row].x, t.outlets[row].y
             rx, ry = cut[0] - (sn * bx + c * by) * cut[2], cut[1] + (c * bx - sn * by) * cut[2]
-            move_ends(t, work, condensed, t.cylinders[0], cx, cy, rx, ry, cut[m])
+            move_ends(t, work, t.cylinders[0], cx, cy, rx, ry, cut[m])
         elif kind == JOINT_B:
-            m = open_loop(t, state, work, condensed, row, k, m)
+            m = open_loop(t, state, work, row, k, m)
         elif kind == JOINT_A:
             at = t.joints[row].z
             for i in range(2 + 2 * t.joints[row].clearances):

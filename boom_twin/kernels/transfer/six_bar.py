@@ -117,7 +117,7 @@ def _add_link(t, joint, linkage, side, turns, motion, position, g, h):
 
 
 @inner
-def _add_cylinder(t, state, work, condensed, index, motion, drive, drive_rate, g, h):
+def _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h):
     """The cylinder between pin C and the rod pin on its link."""
     linkage, cylinder, pins = t.linkages[index], t.cylinders[index], state.pins[index]
     own_g, own_h = work.own_g, work.own_h
@@ -125,7 +125,7 @@ def _add_cylinder(t, state, work, condensed, index, motion, drive, drive_rate, g
         cylinder, t.parts, t.oils, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.z[cylinder.z],
         drive[index], drive_rate[index], motion, t.gravity, work.position, own_g, own_h,
     )  # fmt: skip
-    condense_ends(t, state, work, condensed, cylinder, own_g, own_h)
+    condense_ends(t, state, work, cylinder, own_g, own_h)
     bx, by, c, s = link_frame(linkage.mount, linkage, state.turns[index])
     wx, wy = rotated(c, s, linkage.along, linkage.left)
     base, link = SECTION, ALPHA_R
@@ -163,12 +163,12 @@ def _add_cylinder(t, state, work, condensed, index, motion, drive, drive_rate, g
 
 
 @inner
-def _add_side(t, state, work, condensed, index, side, motion, drive, drive_rate, g, h):
+def _add_side(t, state, work, index, side, motion, drive, drive_rate, g, h):
     """Link L or R of joint `index`, with the cylinder if it pushes on it."""
     linkage = t.linkages[index]
     _add_link(t, t.joints[index], linkage, side, state.turns[index], motion, work.position, g, h)
     if linkage.mount == side:
-        _add_cylinder(t, state, work, condensed, index, motion, drive, drive_rate, g, h)
+        _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h)
 
 
 @inner
@@ -182,7 +182,7 @@ def _add_cut(work, m, behind, renew, g, h):
 
 
 @inner
-def close_loop(t, state, work, condensed, motion, drive, drive_rate, index, operation, m):
+def close_loop(t, state, work, motion, drive, drive_rate, index, operation, m):
     """Condense joint B `index`: the cut of section i (m slots) becomes the cut at the head, pin C carried as slots 3 and 4.
 
     Returns False if the loop's system is singular (a linkage at its dead centre, no inertia).
@@ -195,29 +195,29 @@ def close_loop(t, state, work, condensed, motion, drive, drive_rate, index, oper
         for j in range(i + 1 if motion.renew else 0):
             h[i, j] = 0.0
     if joint.clearances == 0:
-        _add_side(t, state, work, condensed, index, LINK_L, motion, drive, drive_rate, g, h)
-        _add_side(t, state, work, condensed, index, LINK_R, motion, drive, drive_rate, g, h)
+        _add_side(t, state, work, index, LINK_L, motion, drive, drive_rate, g, h)
+        _add_side(t, state, work, index, LINK_R, motion, drive, drive_rate, g, h)
         _add_cut(work, m, behind, motion.renew, g, h)
         _add_closure(joint, linkage, state.z, turns, motion.renew, g, h)
         if motion.renew:
-            return _condense_loop(work, condensed, index, operation, INNER, size)
-        _condense_loop_forces(work, condensed, operation, INNER, size)
+            return _condense_loop(work, index, operation, INNER, size)
+        _condense_loop_forces(work, operation, INNER, size)
         return True
     keep_rows(work.apart, g, h, size)
-    _add_side(t, state, work, condensed, index, LINK_L, motion, drive, drive_rate, g, h)
+    _add_side(t, state, work, index, LINK_L, motion, drive, drive_rate, g, h)
     take_rows(t, work, joint, LINK_L_PIN, size, g, h)
     keep_rows(work.apart, g, h, size)
-    _add_side(t, state, work, condensed, index, LINK_R, motion, drive, drive_rate, g, h)
+    _add_side(t, state, work, index, LINK_R, motion, drive, drive_rate, g, h)
     take_rows(t, work, joint, LINK_R_PIN, size, g, h)
     _add_cut(work, m, behind, motion.renew, g, h)
     take_rows(t, work, joint, PIVOT, size, g, h)
     _add_closure(joint, linkage, state.z, turns, motion.renew, g, h)
     free_pins(t, state, work, joint, g, h)
-    return _condense_loop(work, condensed, index, operation, behind - SECTION, size)
+    return _condense_loop(work, index, operation, behind - SECTION, size)
 
 
 @inner
-def _condense_loop(work, condensed, index, operation, count, size):
+def _condense_loop(work, index, operation, count, size):
     """Solve the `count` inner unknowns for all others; gains and block are kept, the cut is rewritten.
 
     A Newton pass wants H d + g = 0. With the inner unknowns q and all others x,
@@ -233,8 +233,9 @@ def _condense_loop(work, condensed, index, operation, count, size):
     the five others before SECTION meet q in its rows, those behind it in its columns.
     """
     s, p, g, h, right = work.s, work.p, work.g, work.h, work.right
-    matrix, order = condensed.factors[operation], condensed.order[operation]
-    block, gains, free, others = condensed.blocks[index], condensed.gains[operation], condensed.free[operation], size - count
+    condensed = work.condensed
+    matrix, order, block = condensed.factors[operation], condensed.order[operation], condensed.blocks[index]
+    gains, free, others = condensed.gains[operation], condensed.free[operation], size - count
     for i in range(count):
         for j in range(SECTION):
             right[i, j] = h[SECTION + i, j]
@@ -267,31 +268,32 @@ def _condense_loop(work, condensed, index, operation, count, size):
 
 
 @inner
-def _condense_loop_forces(work, condensed, operation, count, size):
+def _condense_loop_forces(work, operation, count, size):
     """Condense forces as `_condense_loop` does, by the gains and the factors that it left."""
-    p, g, right, others, gains = work.p, work.g, work.right, size - count, condensed.gains[operation]
+    p, g, right, others, gains = work.p, work.g, work.right, size - count, work.condensed.gains[operation]
     for i in range(others):
         p[i] = g[i if i < SECTION else i + count]
         for k in range(count):
             p[i] -= gains[k, i] * g[SECTION + k]
     for i in range(count):
         right[i, 0] = g[SECTION + i]
-    substitute(condensed.factors[operation], condensed.order[operation], right, count, np.int64(1))
+    substitute(work.condensed.factors[operation], work.condensed.order[operation], right, count, np.int64(1))
     for i in range(count):
-        condensed.free[operation, i] = right[i, 0]
+        work.condensed.free[operation, i] = right[i, 0]
 
 
 @inner
-def open_loop(t, state, work, condensed, index, operation, m):
+def open_loop(t, state, work, index, operation, m):
     """Increments of joint B `index` from the cut at its head (m slots), which becomes that of section i; returns its slots."""
-    joint, cut, dz, gains, free = t.joints[index], work.cut, work.dz, condensed.gains[operation], condensed.free[operation]
+    joint, cut, dz = t.joints[index], work.cut, work.dz
+    gains, free = work.condensed.gains[operation], work.condensed.free[operation]
     for i in range(INNER + 2 * joint.clearances):
         value = -free[i]
         for j in range(m):
             value -= gains[i, j] * cut[j]
         dz[joint.z + i] = value
     if t.cylinders[index].clearances:
-        _move_cylinder(t, state, work, condensed, index)
+        _move_cylinder(t, state, work, index)
     for k in range(joint.clearances):
         if t.clearances[joint.first_clearance + k].place == PIVOT:
             cut[0] += dz[joint.z + INNER + 2 * k]
@@ -303,7 +305,7 @@ def open_loop(t, state, work, condensed, index, operation, m):
 
 
 @inner
-def _move_cylinder(t, state, work, condensed, index):
+def _move_cylinder(t, state, work, index):
     """Increments of the ends of a six-bar's cylinder from those of its pins."""
     joint, linkage, cut, dz = t.joints[index], t.linkages[index], work.cut, work.dz
     bx, by, c, s = link_frame(linkage.mount, linkage, state.turns[index])
@@ -317,4 +319,4 @@ def _move_cylinder(t, state, work, condensed, index):
         if (place == LINK_L_PIN) == (linkage.mount == LINK_L) and place != Q_PIN:
             rx, ry = rx + dz[at], ry + dz[at + 1]
     rx, ry = rx - by * base - wy * link, ry + bx * base + wx * link
-    move_ends(t, work, condensed, t.cylinders[index], cut[PIN_C], cut[PIN_C + 1], rx, ry, dz[joint.z + Z_FORCE_B])
+    move_ends(t, work, t.cylinders[index], cut[PIN_C], cut[PIN_C + 1], rx, ry, dz[joint.z + Z_FORCE_B])

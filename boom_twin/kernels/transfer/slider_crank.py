@@ -3,11 +3,19 @@
 At the rod pin, the inward sweep adds the cylinder to the cut, with a column for its force N. At the pivot, the section's angle
 and N remain to be solved. The pivot is fixed; with clearance, the offset of its journal is solved too. The rotation of a base
 on an elastic hinge has the column after that of N.
+
+The elastic hinge is a rotational spring and damper between ground and massless base about the pivot of joint 1. With rotation
+phi of the base, stiffness k, damping d and energy k phi^2 / 2,
+
+    moment    k phi + d phi',   phi' = C phi + D;      tangent   k + d C.
+
+C is `Motion.rate`. The barrel pin of cylinder 1 rotates with the base. With c from pivot to pin, n = c rotated by 90 degrees,
+
+    dr_C = n dphi,   d2r_C = -c dphi^2.
 """
 
 from __future__ import annotations
 
-from ..elements.base_hinge import hinge_moment, turn_barrel_force, turn_barrel_tangent
 from ..elements.cylinder import AXIAL, END_C, END_R, cylinder_terms
 from ..elements.pin_contact import (
     BARREL_END_PIN,
@@ -28,7 +36,39 @@ from .clearance_pins import condense_ends, torque_of
 
 
 @inner
-def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m):
+def hinge_moment(hinge, turn, motion):
+    """Return the moment (N m) of the hinge at a rotation phi (rad)."""
+    return hinge.stiffness * turn + hinge.damping * (motion.rate * turn + motion.offset[hinge.z])
+
+
+@inner
+def turn_barrel_force(g, cx, cy):
+    """Return the derivative by phi of a work with gradient `g` over (C, R, N); (cx, cy): from pivot to barrel pin."""
+    return cx * g[END_C + 1] - cy * g[END_C]
+
+
+@inner
+def turn_barrel_tangent(hinge, motion, g, h, cx, cy, bx, by, s, m):
+    """Write row and column m (phi) of the cut from cylinder 1's gradient g and Hessian h. N has m - 1.
+
+    Vectors (m): (cx, cy) from the pivot to the barrel pin, (bx, by) from the frame to the rod pin.
+    """
+    for i in range(m):
+        s[m, i] = 0.0
+    for i in range(2):
+        s[m, i] = cx * h[END_C + 1, END_R + i] - cy * h[END_C, END_R + i]
+    s[m, 2] = bx * s[m, 1] - by * s[m, 0]
+    s[m, m - 1] = cx * h[END_C + 1, AXIAL] - cy * h[END_C, AXIAL]
+    for i in range(m):
+        s[i, m] = s[m, i]
+    turned_x = cx * h[END_C + 1, END_C] - cy * h[END_C, END_C]
+    turned_y = cx * h[END_C + 1, END_C + 1] - cy * h[END_C, END_C + 1]
+    bend = cx * g[END_C] + cy * g[END_C + 1]
+    s[m, m] = cx * turned_y - cy * turned_x - bend + hinge.stiffness + hinge.damping * motion.rate
+
+
+@inner
+def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
     """Add cylinder 1 at outlet `row` of a frame (cos c, sin sn). Return the size of the cut, with N and the base's rotation."""
     outlet = t.outlets[row]
     pins, cylinder, s, p = state.pins[0], t.cylinders[0], work.s, work.p
@@ -37,7 +77,7 @@ def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m
         cylinder, t.parts, t.oils, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.z[cylinder.z],
         drive[0], drive_rate[0], motion, t.gravity, work.position, g, h,
     )  # fmt: skip
-    condense_ends(t, state, work, condensed, cylinder, g, h)
+    condense_ends(t, state, work, cylinder, g, h)
     bx, by = c * outlet.x - sn * outlet.y, sn * outlet.x + c * outlet.y
     for i in range(2):
         p[i] += g[END_R + i]
@@ -90,13 +130,14 @@ def slot_of(unknown, offsets):
 
 
 @inner
-def close_base(t, work, condensed, renew, operation):
+def close_base(t, work, renew, operation):
     """Solve the increments of joint A and store them for `operation`, in the order of `slot_of`.
 
     renew : True for a new tangent. Return False if it is singular.
     """
     s, p, b, joint = work.s, work.p, work.right, t.joints[0]
-    a, order, offsets = condensed.factors[operation], condensed.order[operation], 2 * joint.clearances
+    condensed, offsets = work.condensed, 2 * joint.clearances
+    a, order = condensed.factors[operation], condensed.order[operation]
     size = 2 + offsets + t.hinges.shape[0]
     for i in range(size):
         of = slot_of(i, offsets)

@@ -18,7 +18,6 @@ from .kept_tangent import (
     forget_all,
     forget_tangent,
     is_converged,
-    is_rough,
     keep_tangent,
     may_keep,
     note_correction,
@@ -30,7 +29,6 @@ ANEW = np.bool_(False)  # `keep` of `advance`: no kept tangent. Typed, because n
 TICKS = np.int64(4096)  # ticks of a step; sub-steps are whole numbers of ticks
 MOST = np.int64(32)  # largest number of sub-steps for accuracy; after failed passes they are divided down to SHORTEST
 SHORTEST = 1e-5  # s, shortest sub-step
-EASY = 0.1  # ratio of error to allowed error, below which the next sub-step is twice as long
 LONGEST_INCREMENT = 0.5  # rad, limit of the increments in one pass of a time step; larger ones mean divergence
 
 
@@ -51,7 +49,6 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
     Return status, passes, and last increment (rad). After a failure the histories are those of the last complete sub-step.
     """
     history, operations, done, total, size = state.history, t.operations.shape[0], 0, 0, 0.0
-    condensed = work.condensed
     part, least = first_part(t, state, scheme), least_part(t, scheme)
     coarse = max(least, TICKS // MOST)
     now = scheme
@@ -78,9 +75,9 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
                 clear_cut(work, FREE)
                 work.p[0] -= fx
                 work.p[1] -= fy
-                solved, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE, condensed)
+                solved, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
                 if solved == OK:
-                    sweep_out(t, state, work, condensed, ROOT, operations, FREE)
+                    sweep_out(t, state, work, ROOT, operations, FREE)
             else:
                 solved = plain_pass(t, state, work, motion, work.drive, work.drive_rate, product)
             if solved == OK:
@@ -97,10 +94,10 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
                 status = newton_status(work, solved, size, tolerance, passes)
         if keep:
             note_correction(state, work)
-            if left < passes - (2 if is_rough(tolerance) else 1):
+            if left < passes - 1:
                 forget_tangent(work)
         total += passes - left
-        error = coarseness(t, state, work, condensed, now)
+        error = coarseness(t, state, work, now)
         if (status != OK and part > least) or (error > 1.0 and part > coarse):
             part //= 2
             for i in range(state.z.shape[0]):
@@ -111,7 +108,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
         note_contacts(t, state, work)
         finish_step(now, work.position, work.hat, work.offset, work.velocity, work.acceleration, history)
         done += part
-        if error < EASY and part < TICKS and done % (2 * part) == 0:
+        if error < 0.1 and part < TICKS and done % (2 * part) == 0:
             part *= 2
     state.pace[0] = part
     for i in range(drive.shape[0]):

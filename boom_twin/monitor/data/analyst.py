@@ -1,24 +1,24 @@
-"""Analysis beside the server, of what is shown: spectrum, natural frequencies of the model, response of the tip to loads."""
+"""Analysis beside the server, of what is shown: spectrum, natural frequencies of the model, pump rates to avoid."""
 
 from __future__ import annotations
 
 import asyncio
-from dataclasses import asdict, dataclass, field
-from math import floor
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from ...analysis.frequency_response import UPWARD, linearised_boom
 from ...analysis.posture_modes import MOVED, ModeList, PresentPosture
-from ...analysis.resonance_map import TOO_MUCH
+from ...analysis.sample_series import power_density, spacing
+from ...analysis.steady_state import TOO_MUCH
 from ...errors import BoomTwinError
 from ...scene.pump_pulses import CHANGE_OVER
 from ...scene.schema import Scene
 from ...types import Array
-from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
+from ..protocol import SPECTRUM, pack
 from .feed import Feed
-from .spectrum import COLUMN_STEP, SEGMENT, SPECTRUM_SPAN, Peak, spectrogram, spectrum
 from .topic_rows import ESTIMATE
 
 
@@ -39,37 +39,31 @@ SIGNALS = (
     PREDICTION,
 )
 """The best first: the prediction knows nothing of what shakes the boom."""
-RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)  # frequencies of the responses, Hz
+RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)  # of the response of the tip, Hz
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TipResponses:
-    """Amplitude of the tip's acceleration under harmonic loads."""
+class RatesToAvoid:
+    """Pump rates from and to (Hz) at which the tip swings too much in a posture; why they are not known."""
 
-    loads: tuple[str, ...] = ()  # in words
-    frequencies: Array = field(default_factory=lambda: np.zeros(0))  # (k,), Hz
-    accelerations: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, loads), both directions together, m/s^2
-    avoid: tuple[tuple[float, float], ...] = ()  # pump rates from and to (Hz) at which the tip swings too much
-    trouble: str = ""  # why there are none
+    avoid: tuple[tuple[float, float], ...] = ()
+    trouble: str = ""
 
 
-class ResponseList(PresentPosture[TipResponses]):
-    """Frequency response of the tip to 1 N at the tip, and to 1 mm of every cylinder's drive."""
+class RateList(PresentPosture[RatesToAvoid]):
+    """Pump rates to avoid, from the frequency response of the tip to 1 N there."""
 
     def __init__(self, scene: Scene) -> None:
         super().__init__()
         self._scene = scene
 
-    def _work_out(self, strokes: Array) -> TipResponses:
+    def _work_out(self, strokes: Array) -> RatesToAvoid:
         try:
             boom = linearised_boom(self._scene, strokes)
-            drives = range(boom.plan.joints)
-            loads = [boom.load(UPWARD), *(1e-3 * boom.load(drive=i) for i in drives)]
-            columns = [np.linalg.norm(boom.respond(RESPONSE_FREQUENCIES, load).tip_acceleration, axis=1) for load in loads]
+            response = boom.respond(RESPONSE_FREQUENCIES, boom.load(UPWARD)).tip_acceleration
         except BoomTwinError as error:
-            return TipResponses(trouble=str(error))
-        names = ("1 N at the tip, up", *(f"1 mm of cylinder {i + 1}" for i in drives))
-        return TipResponses(names, RESPONSE_FREQUENCIES, np.column_stack(columns), rates_to_avoid(columns[0]))
+            return RatesToAvoid(trouble=str(error))
+        return RatesToAvoid(rates_to_avoid(np.linalg.norm(response, axis=1)))
 
 
 PUMP_RATES = np.linspace(0.2, 1.2, 201)  # rates of a pump, Hz
@@ -80,7 +74,7 @@ def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
     """Return the ranges of pump rates (Hz) at which the tip swings `TOO_MUCH` times as far as at the median rate.
 
     `accelerations` (k,) of the tip (m/s^2) by 1 N are at `RESPONSE_FREQUENCIES`. The rule is that of
-    `boom_twin.analysis.resonance_map`: root mean square for peak to peak.
+    `boom_twin.analysis.steady_state`: root mean square for peak to peak.
     """
     swings = accelerations / (2.0 * np.pi * RESPONSE_FREQUENCIES) ** 2
     at = HARMONICS * PUMP_RATES[:, None]
@@ -91,8 +85,62 @@ def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
     return tuple((float(PUMP_RATES[a]), float(PUMP_RATES[b])) for a, b in zip(starts, stops, strict=True))
 
 
-UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
-UNKNOWN_POSTURE = TipResponses(trouble="the posture is not known yet")
+SPECTRUM_SPAN = 40.0  # time span of the spectrum, up to the shown time, s
+SEGMENT = 8.0  # segment of Welch's method, s (Hann window, half overlapping, mean removed)
+LOWEST_PEAK, HIGHEST_PEAK = 0.3, 30.0  # frequencies of peaks, Hz
+MAX_PEAKS = 5
+PROMINENCE = 6.0  # lowest prominence of a peak, dB
+
+
+@dataclass(frozen=True, slots=True)
+class Peak:
+    """Peak of the spectrum: frequency (Hz), density ((m/s^2)^2/Hz)."""
+
+    frequency: float
+    density: float
+
+
+@dataclass(frozen=True, slots=True)
+class Spectrum:
+    """Spectrum: frequencies (k,) in Hz, one-sided densities (k, c) in (m/s^2)^2/Hz, peaks of their sum by frequency."""
+
+    frequencies: Array
+    densities: Array
+    peaks: tuple[Peak, ...]
+
+
+def spectrum(times: Array, values: Array) -> Spectrum | None:
+    """Return the spectrum of `values` (n, c) in m/s^2 at `times` (n,) in s; None if they last less than one segment."""
+    finite = np.isfinite(values).all(axis=1)
+    times, values = times[finite], values[finite]
+    if len(times) < 32 or times[-1] - times[0] < SEGMENT:
+        return None
+    rate = 1.0 / spacing(times)
+    even = times[0] + np.arange(round((times[-1] - times[0]) * rate) + 1) / rate
+    values = np.stack([np.interp(even, times, column) for column in values.T], axis=1)
+    length = min(round(SEGMENT * rate), len(even))
+    frequencies, densities, _ = power_density(values, 1.0 / rate, length)
+    peaks = tuple(sorted(_peaks(frequencies, densities.sum(axis=1), rate), key=lambda peak: peak.frequency))
+    return Spectrum(frequencies, densities, peaks)
+
+
+def _peaks(frequencies: Array, density: Array, rate: float) -> list[Peak]:
+    """Return the highest prominent peaks. Their frequency is from a parabola through the decibels."""
+    level = 10.0 * np.log10(np.maximum(density, 1e-30))
+    found, _ = find_peaks(level, prominence=PROMINENCE)
+    found = [i for i in found if LOWEST_PEAK <= frequencies[i] <= min(HIGHEST_PEAK, 0.4 * rate)]
+    peaks = []
+    for i in sorted(found, key=lambda place: -level[place])[:MAX_PEAKS]:
+        below, top, above = level[i - 1 : i + 2]
+        bend = below - 2.0 * top + above
+        offset = 0.5 * (below - above) / bend if bend else 0.0
+        frequency = float(frequencies[i] + offset * (frequencies[1] - frequencies[0]))
+        peaks.append(Peak(frequency, float(density[i])))
+    return peaks
+
+
+UNKNOWN_SCENE = RatesToAvoid(trouble="the model is not known: give --scene")
+UNKNOWN_POSTURE = RatesToAvoid(trouble="the posture is not known yet")
 KNOWN_SHARE = 0.9  # share of the rows of a signal that must have a value
 MODE_DISTANCE = 0.2  # relative distance up to which a peak is taken for a mode of the model
 
@@ -103,10 +151,9 @@ class Analyst:
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
         self._modes: ModeList | None = None
-        self._responses: ResponseList | None = None
-        self._turn, self._response_turn = asyncio.Lock(), asyncio.Lock()
+        self._rates: RateList | None = None
+        self._turn, self._rates_turn = asyncio.Lock(), asyncio.Lock()
         self._known: tuple[tuple[int, int], tuple[dict[str, Any], bytes]] | None = None
-        self._firsts: dict[int, tuple[float, float]] = {}
 
     async def spectrum_at(self, time: float) -> tuple[dict[str, Any], bytes] | None:
         """Return text message ``lines`` and binary block of the spectrum at `time` (s); None without enough of a signal."""
@@ -128,38 +175,24 @@ class Analyst:
             moved = self._moved(time)
             number = list(store.tables).index(signal.table)
             block = pack(SPECTRUM, number, found.frequencies, found.densities.astype("f4"))
-            peaks = [self._placed(peak, natural, time, moved > MOVED) for peak in found.peaks]
+            peaks = [self._placed(peak, natural if moved <= MOVED else []) for peak in found.peaks]
             lines = {"kind": "lines", "natural": natural, "peaks": peaks, "source": signal.name, "axes": signal.axes}
             self._known = key, ({**lines, "moved": moved if moved > MOVED else 0.0}, block)
             return self._known[1]
 
-    async def response_at(self, time: float) -> TipResponses:
-        """Return the tip's response to loads in the posture at `time` (s); the same object while the boom has not moved.
+    async def rates_at(self, time: float) -> RatesToAvoid:
+        """Return the pump rates to avoid in the posture at `time` (s); the same object while the boom has not moved.
 
         It has a model of its own, so that no spectrum waits for the first one, which compiles for half a minute.
         """
-        async with self._response_turn:
+        async with self._rates_turn:
             scene, strokes = self._feed.scene(), self._feed.strokes(time)
             if scene is None:
                 return UNKNOWN_SCENE
             if len(strokes) != len(scene.joints):
                 return UNKNOWN_POSTURE
-            self._responses = self._responses or ResponseList(scene)
-            return await asyncio.to_thread(self._responses.at, strokes)
-
-    async def spectrogram_between(self, after: float, until: float) -> tuple[float, bytes] | None:
-        """Return time (s) of the newest column of the spectrogram between two times, and the block of all its columns."""
-        signal = self._signal(until := COLUMN_STEP * floor(until / COLUMN_STEP))
-        table = self._feed.store.tables.get(signal.table)
-        if table is None:
-            return None
-        ends = COLUMN_STEP * np.unique(np.ceil(table.rows(table.until(after), table.until(until))[0] / COLUMN_STEP))
-        ends = ends[(ends > max(after, SEGMENT)) & (ends <= until)]  # none in a pause, which may last for days
-        if not len(ends):
-            return None
-        times, values = table.rows(table.until(ends[0] - SEGMENT), table.until(ends[-1]))
-        found = await asyncio.to_thread(spectrogram, times, values[:, signal.columns].astype(float), ends)
-        return float(ends[-1]), pack(SPECTROGRAM, SIGNALS.index(signal), ends, found)
+            self._rates = self._rates or RateList(scene)
+            return await asyncio.to_thread(self._rates.at, strokes)
 
     def _signal(self, time: float) -> Signal:
         """Return the best acceleration that has values in the last segment before `time` (s)."""
@@ -175,19 +208,14 @@ class Analyst:
         strokes = self._feed.strokes_between(time - SPECTRUM_SPAN, time)
         return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
 
-    def _placed(self, peak: Peak, natural: list[float], time: float, has_moved: bool) -> dict[str, Any]:
-        """Return a peak with the number of its mode, its deviation from the model, and its drift since the first look.
-
-        None of these is given if the boom has moved, because its frequencies do not belong to one posture.
-        """
-        told: dict[str, Any] = {**asdict(peak), "mode": None, "deviation": None, "drift": None}
-        mode = int(np.argmin(np.abs(np.array(natural) - peak.frequency))) + 1 if natural and not has_moved else 0
+    @staticmethod
+    def _placed(peak: Peak, natural: list[float]) -> dict[str, Any]:
+        """Return a peak with the number of its mode and its deviation from the model; None without a mode near it."""
+        told: dict[str, Any] = {**asdict(peak), "mode": None, "deviation": None}
+        mode = int(np.argmin(np.abs(np.array(natural) - peak.frequency))) + 1 if natural else 0
         if not mode or abs(natural[mode - 1] - peak.frequency) > MODE_DISTANCE * natural[mode - 1]:
             return told
-        ratio = peak.frequency / natural[mode - 1]
-        if mode not in self._firsts or time < self._firsts[mode][0]:
-            self._firsts[mode] = time, ratio
-        return told | {"mode": mode, "deviation": ratio - 1.0, "drift": ratio / self._firsts[mode][1] - 1.0}
+        return told | {"mode": mode, "deviation": peak.frequency / natural[mode - 1] - 1.0}
 
     def _natural(self, strokes: list[float]) -> list[float]:
         scene = self._feed.scene()
@@ -195,9 +223,3 @@ class Analyst:
             return []
         self._modes = self._modes or ModeList(scene)
         return self._modes.at(strokes)
-
-
-def response_messages(found: TipResponses) -> tuple[dict[str, Any], bytes]:
-    """Return text message ``loads`` and binary block of a response; the block is empty if there is no response."""
-    text = {"kind": "loads", "names": found.loads, "trouble": found.trouble, "avoid": found.avoid}
-    return text, pack(RESPONSE, 0, found.frequencies, found.accelerations.astype("f4")) if found.loads else b""

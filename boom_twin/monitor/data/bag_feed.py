@@ -11,23 +11,21 @@ from types import SimpleNamespace
 from typing import Any
 
 from ...bag.reader import Session, read
+from ...bag.session_file import WHOLE, TimeWindow
 from ...bag.session_model import SessionScene
-from ...bag.time_window import WHOLE, TimeWindow
 from ...config.settings import Settings, Thresholds
-from ...diagnostics.boom_mismatch import OtherBoom
 from ...diagnostics.levels import Status
 from ...diagnostics.sensor_status import sensors_of
 from ...diagnostics.topic_status import Peers
-from ...diagnostics.twin_status import TwinWatch, all_pieces
+from ...diagnostics.twin_status import TwinWatch
 from ...errors import BagError, BoomTwinError
 from ...messages.report_encoder import ReportEncoder
 from ...messages.topic_table import NODE, Output, Topic, Topics
-from ...offline.inputs import ReplayInputs, ReplayOptions, replay_inputs
+from ...offline.inputs import OtherBoom, ReplayInputs, ReplayOptions, replay_inputs
 from ...offline.session_samples import SessionSamples
 from ...scene.schema import Scene
-from ...twin.driver import Step, drive
-from ...twin.twin import Twin
-from ...types import NANO
+from ...twin.twin import Twin, drive
+from ...types import NANO, Report, Sample
 from .feed import Feed
 from .store import Store
 
@@ -133,9 +131,9 @@ def _take_predicted(feed: BagFeed, topics: Topics, given: ReplayInputs, twin: Tw
         yield
     feed.phase = ""
     samples = SessionSamples(given.session, topics, given.wanted, twin.twin.plan.joints, given.window).samples()
-    for step in drive(twin.twin, samples):
+    for step in drive(twin.twin, twin.twin.update, samples):
         if step is not None:
-            twin.took(step)
+            twin.took(*step)
         yield
     twin.finish()
     if not feed.store.tables:
@@ -158,9 +156,8 @@ class TwinView:
         self._peers = {stream: Peers(topic.absolute) for stream, topic in topics.inputs.items()}
         self._looked: float | None = None
 
-    def took(self, step: Step) -> None:
+    def took(self, sample: Sample, report: Report) -> None:
         """Show the results of one sample."""
-        sample, report, _ = step
         self._time = max(self._time, sample.stamp * NANO)
         if self._looked is None:
             self._watch.begin()
@@ -184,7 +181,7 @@ class TwinView:
             raise BagError(f"{reason}: the scene is of another boom. Give the one of this by --scene.")
 
     def _look(self) -> None:
-        found = all_pieces(self._watch.look(self.twin.counts, "", self._peers, (), self._time))
+        found = self._watch.look(self.twin.counts, "", self._peers, (), self._time)
         store, now = self._feed.store, self._feed.now()
         store.set_statuses(now, store.statuses(now).updated(now, map(_as_message, found), self._time))
         self._looked = self._time

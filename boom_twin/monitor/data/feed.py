@@ -1,17 +1,12 @@
-"""Feeds of the live page: live and recorded sources, the sessions to choose from, a viewer's place in a recording."""
+"""Feeds of the live page: live and recorded sources, and a viewer's place in a recording."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-
 import numpy as np
 
-from ...analysis.cylinder_drives import drives_as_read
-from ...bag.storages import is_session
+from ...analysis.drive import drives_as_read
 from ...compiler.compile import compile_scene
 from ...compiler.plan import Plan
-from ...errors import BagError, BoomTwinError
 from ...messages.topic_table import Topics
 from ...scene import load_scene
 from ...scene.load import DEFAULT_NAME
@@ -51,10 +46,6 @@ class Feed:
         """Publish an event, so that a recording of the session holds it."""
         raise NotImplementedError
 
-    def release_alarms(self) -> str:
-        """Ask the node to release alarms that have ended; return in words if it could be asked."""
-        raise NotImplementedError
-
     def close(self) -> None:
         """Release all resources of the feed."""
 
@@ -89,49 +80,6 @@ class Feed:
             return strokes
         self._plan = self._plan or compile_scene(scene)
         return drives_as_read(self._plan, strokes, forces, self._reads)
-
-
-def sessions_in(path: Path) -> list[Path]:
-    """Return the sessions in a folder, by name; the path itself if it is a session, or holds none."""
-    if not path.is_dir() or is_session(path):
-        return [path]
-    return sorted(each for each in path.iterdir() if is_session(each)) or [path]
-
-
-class SessionList:
-    """Recorded sessions, of which one is open at a time: its `index` among the `names`, and its `feed`.
-
-    The first of `paths` that can be read is opened at once; BoomTwinError if none can.
-    """
-
-    def __init__(self, paths: Sequence[Path], open_feed: Callable[[Path], Feed]) -> None:
-        self._paths, self._open_feed = paths, open_feed
-        self.names = [path.name for path in paths]
-        errors: list[BoomTwinError] = []
-        for self.index in range(len(paths)):
-            try:
-                self.feed = self.open(self.index)
-                self.feed.trouble = "; ".join(map(str, errors))
-                return
-            except BoomTwinError as error:
-                errors.append(error)
-        raise errors[0]
-
-    def open(self, index: int) -> Feed:
-        """Return the feed of a session, which is shown from `show` on. Nothing else changes, so a thread may wait for it."""
-        try:
-            return self._open_feed(self._paths[index])
-        except OSError as error:
-            raise BagError(f"{self._paths[index]}: cannot be read ({error.strerror}). Choose another session.") from None
-
-    def show(self, index: int, feed: Feed) -> None:
-        """Replace the feed by that of another session, and close the one before."""
-        before, self.feed, self.index = self.feed, feed, index
-        before.close()
-
-    def close(self) -> None:
-        """Close the feed that is open."""
-        self.feed.close()
 
 
 SLOWEST_PLAYBACK, FASTEST_PLAYBACK = 0.1, 10.0

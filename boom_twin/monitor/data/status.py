@@ -8,11 +8,11 @@ from enum import IntEnum
 from math import inf, isfinite, isnan, nan
 from typing import Any
 
-from ...diagnostics.recorder_status import ENDED
+from ...diagnostics.topic_status import ENDED
 from ...health.alarms import evidence_with_cause
+from ...system.terminal_text import printable
 from ...texts import LANGUAGES, alarm_sentence, alarm_text
 from ...types import Alarm
-from .received_messages import text
 
 SILENCE = 3.0  # seconds without a word from a node after which its lamps are stale
 MAX_NODES, FORGET_AFTER = 200, 60.0  # number of nodes above which those that have been silent for so many seconds are deleted
@@ -139,13 +139,19 @@ def _judged(values: Mapping[str, float], level: Severity) -> tuple[str, float]:
     return found
 
 
-def _number(text: str) -> float:
+def text(found: str) -> str:
+    """Return a text as it may be shown: the beginning of a long one, control characters as escapes."""
+    return printable(found[:LONGEST_TEXT], keep="")
+
+
+def _number(value: str) -> float:
     try:
-        return float(text)
+        return float(value)
     except ValueError:
         return nan
 
 
+LONGEST_TEXT = 500  # characters of a text that are kept
 LONGEST_NAME = 100  # characters beyond which an alarm names no more sensors
 MAX_ALARMS = 500  # alarms that are kept
 
@@ -262,11 +268,6 @@ class AlarmList:
         if alarm is not None:
             alarm.is_acknowledged = True
         return alarm
-
-    def acknowledge_ended(self) -> None:
-        """Acknowledge all ended health alarms, because the node has released them."""
-        for alarm in self.all:
-            alarm.is_acknowledged |= bool(alarm.causes) and alarm.end is not None
 
 
 def _words(channel: str, kind: str, cause: str | None) -> dict[str, str]:

@@ -17,19 +17,18 @@ from ...messages.sample_decoder import SampleDecoder, stamp_of
 from ...messages.topic_table import Output, Topics
 from ...messages.type_store import decode
 from ...types import NANO, SENSORS, Sample, Stream, stream_of
-from .received_messages import (
+from .status import MAX_NODES, Severity, text
+from .store import (
     DroppedMessages,
     MalformedError,
+    Store,
     check_arrays,
     check_count,
     check_instant,
     check_numbers,
     check_residuals,
     check_stamp,
-    text,
 )
-from .status import MAX_NODES, Severity
-from .store import Store
 
 MAX_BYTES = 1_000_000  # bytes of an encoded message; a longer one is not decoded
 MAX_STATUSES, MAX_CAUSES, MAX_MARKERS = 500, 100, 500

@@ -1,4 +1,4 @@
-// What one does with the page: mark, acknowledge, record, export.
+// What one does with the page: mark, acknowledge, export.
 
 import { themeColour } from "./colours.js";
 import { t, words } from "./i18n.js";
@@ -10,25 +10,18 @@ export class Actions {
     this.connection = connection;
     this.view = view;
     this.answer = document.getElementById("answer");
-    this.record = document.getElementById("record");
     const mark = document.getElementById("mark"), dialog = document.getElementById("note"), text = document.getElementById("note-text");
     mark.onclick = () => { text.value = ""; dialog.showModal(); };
     dialog.onclose = () => { if (dialog.returnValue === "ok") connection.send({ do: "mark", note: text.value }); dialog.returnValue = ""; };
-    this.record.onclick = () => connection.send({ do: "record", on: !this.isRecording });
     document.getElementById("alarms").onclick = event => { if (event.target.dataset.number) connection.send({ do: "acknowledge", numbers: [Number(event.target.dataset.number)] }); };
     document.getElementById("picture").onclick = () => this.savePicture();
     document.getElementById("csv").onclick = () => this.saveTable();
     connection.addEventListener("hello", event => this.permit(event.detail.permitted));
     connection.addEventListener("answer", event => { this.answer.textContent = words(event.detail.words); });
-    connection.addEventListener("state", event => {
-      this.isRecording = event.detail.is_recording;
-      this.record.textContent = this.isRecording ? `■ ${t("Stop recording")}` : `● ${t("Record")}`;
-    });
   }
 
   permit(permitted) {
     document.getElementById("mark").disabled = !permitted.includes("mark");
-    this.record.hidden = !permitted.includes("record");
     document.getElementById("alarms").classList.toggle("locked", !permitted.includes("acknowledge"));
   }
 

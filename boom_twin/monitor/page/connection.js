@@ -1,10 +1,9 @@
 // The WebSocket: connected again and again; what comes is handed on.
 
-import { decodeBlocks, RESPONSE, ROWS, SPECTROGRAM, SPECTRUM } from "./protocol.js";
+import { decodeBlocks, ROWS } from "./protocol.js";
 import { Table } from "./table.js";
 
 const RETRY = 1000; // ms
-const EVENTS = { [SPECTRUM]: "spectrum", [SPECTROGRAM]: "spectrogram", [RESPONSE]: "response" };
 
 export class Connection extends EventTarget {
   constructor() {
@@ -42,7 +41,7 @@ export class Connection extends EventTarget {
 
   receiveBlocks(buffer) {
     for (const block of decodeBlocks(buffer)) {
-      if (block.kind !== ROWS) { this.emit(EVENTS[block.kind], block); continue; }
+      if (block.kind !== ROWS) { this.emit("spectrum", block); continue; }
       if (!this.tables[block.table]) continue;
       this.tables[block.table].add(block.times, block.values);
       this.lastRows = performance.now();

@@ -6,7 +6,6 @@ import { Lamps } from "./lamps.js";
 import { Now } from "./now.js";
 import { Connection } from "./connection.js";
 import { Path } from "./path.js";
-import { ResponseTab } from "./response.js";
 import { Shape } from "./shape.js";
 import { HtmlTable } from "./html_table.js";
 import { SpectrumTab } from "./spectrum.js";
@@ -23,8 +22,8 @@ translatePage();
 const connection = new Connection(), view = new View(connection), timeline = new Timeline(connection), lamps = new Lamps(connection);
 new Actions(connection, view);
 new Now(connection);
-const spectrum = new SpectrumTab(connection, new HtmlTable("peaks")), response = new ResponseTab(connection);
-const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, spectrogram: spectrum, shape: new Shape(connection, view), path: new Path(connection, view), response, state: null };
+const spectrum = new SpectrumTab(connection, new HtmlTable("peaks"));
+const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, shape: new Shape(connection, view), path: new Path(connection, view), state: null };
 let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now(), shown = NaN, pace = 0;
 const delays = []; // s from the newest stamp to the frame after its drawing, live, if the clocks agree
 
@@ -34,7 +33,7 @@ function selectTab(tab) {
   open = tab;
   for (const section of document.querySelectorAll(".tab")) section.classList.toggle("open", section.id === tab);
   for (const button of document.querySelectorAll("#tabs button")) button.setAttribute("aria-selected", button.dataset.tab === tab);
-  spectrum.isNew = response.isNew = true;
+  spectrum.isNew = true;
   view.version++;
   if (tab === "state" && lamps.state) lamps.fillTable(lamps.state);
 }
@@ -45,7 +44,6 @@ function setTheme(name) {
   get("theme").textContent = t(name === "dark" ? "Light" : "Dark");
   tabs.traces.rebuild();
   spectrum.rebuild();
-  response.rebuild();
   view.version++;
 }
 
@@ -59,12 +57,6 @@ get("window").onchange = event => view.set({ window: Number(event.target.value),
 get("pause").onclick = pause;
 get("language").replaceChildren(...Object.entries(LANGUAGES).map(([name, label]) => new Option(label, name, name === language, name === language)));
 get("language").onchange = event => choose(event.target.value);
-get("sessions").onchange = event => connection.send({ do: "session", value: Number(event.target.value) });
-
-function showSessions({ sessions, session }) {
-  get("sessions").hidden = sessions.length < 2;
-  get("sessions").replaceChildren(...sessions.map((name, i) => new Option(name, i, i === session, i === session)));
-}
 get("all").onclick = () => view.set({ zoom: null });
 get("theme").onclick = () => setTheme(theme() === "dark" ? "light" : "dark");
 
@@ -80,7 +72,6 @@ addEventListener("keydown", event => {
 
 connection.addEventListener("hello", event => {
   get("title").textContent = t(event.detail.title);
-  showSessions(event.detail);
   get("pause").hidden = timeline.isReplay;
   view.set({ end: null, zoom: null });
 });
@@ -126,4 +117,4 @@ setInterval(() => lamps.watch(timeline.isReplay), 500);
 setTheme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
 selectTab("traces");
 requestAnimationFrame(draw);
-Object.assign(window, { twin: { connection, view, timeline, delays, shape: tabs.shape, response, charts: name => tabs.traces.charts.get(name) } }); // for tests and for the curious
+Object.assign(window, { twin: { connection, view, timeline, delays, shape: tabs.shape, charts: name => tabs.traces.charts.get(name) } }); // for tests and for the curious

@@ -1,6 +1,6 @@
 // Two figures of now: how far the tip swings against its limit, and the pump's rate against the rates to avoid.
 
-import { t } from "./i18n.js";
+import { t, words } from "./i18n.js";
 
 const MOST = 3; // ranges that there is room for
 const NEAR = 0.01; // Hz, beside a range to avoid
@@ -8,7 +8,8 @@ const NEAR = 0.01; // Hz, beside a range to avoid
 export class Now {
   constructor(connection) {
     this.avoid = [];
-    connection.addEventListener("loads", event => { this.avoid = event.detail.avoid; this.show(); });
+    this.trouble = "rates to avoid are not known yet";
+    connection.addEventListener("rates", event => { Object.assign(this, { avoid: event.detail.avoid, trouble: event.detail.trouble }); this.show(); });
     connection.addEventListener("state", event => { this.lamps = event.detail.groups.flatMap(group => group.lamps); this.show(); });
   }
 
@@ -28,7 +29,7 @@ export class Now {
     const ranges = near.map(range => [...new Set(range.map(rate => rate.toFixed(2)))].join("–")).join(", ");
     const isBad = this.avoid.some(([from, to]) => rate > from - NEAR && rate < to + NEAR);
     fill("pump-now", !rate ? "OFF" : isBad ? "WARN" : "OK", rate ? t("pump {rate} Hz ({count}/min)", { rate: rate.toFixed(2), count: (60 * rate).toFixed(0) }) : t("no pump pulses"),
-      ranges ? t("avoid {ranges} Hz", { ranges }) : t("rates to avoid are not known yet"), 0);
+      ranges ? t("avoid {ranges} Hz", { ranges }) : words(this.trouble), 0);
   }
 }
 

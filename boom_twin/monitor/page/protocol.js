@@ -1,6 +1,6 @@
 // Binary messages as boom_twin/monitor/protocol.py describes them.
 
-export const ROWS = 1, SPECTRUM = 2, SPECTROGRAM = 3, RESPONSE = 4;
+export const ROWS = 1, SPECTRUM = 2;
 
 export function* decodeBlocks(buffer) {
   const view = new DataView(buffer);

@@ -19,12 +19,12 @@ from ...bag.async_writer import Storage
 from ...bag.writer import LARGEST_MESSAGE
 from ...config.settings import Settings, Thresholds
 from ...diagnostics.levels import ComponentJudge, Evaluation
-from ...diagnostics.recorder_status import TopicCount, recording_status
+from ...diagnostics.topic_status import TopicCount, recording_status
 from ...errors import BagError, BoomTwinError
 from ...messages.topic_table import NODE, Output, load_topics
 from ...types import NANO
-from ..diagnostics_publisher import DiagnosticsPublisher
-from ..runtime import CallbackTurns, with_information
+from ..receive import CallbackTurns, with_information
+from ..runtime import DiagnosticsPublisher
 from .subscriptions import RequestedTopic, subscription_of
 
 NAMES = ("scene", "mapping", "frame_prefix", *Settings.model_fields)
@@ -198,7 +198,7 @@ class Recorder:
         return all(number for number, is_required in publishers if is_required)
 
     def _publish(self, end: str | None = None) -> None:
-        """Publish the recording's state; `end` as for `boom_twin.diagnostics.recorder_status.recording_status`."""
+        """Publish the recording's state; `end` as for `boom_twin.diagnostics.topic_status.recording_status`."""
         counts = [channel.count() for channel in self._channels]
         at = Evaluation(self._thresholds, time.monotonic(), self._node.get_clock().now().nanoseconds * NANO)
         self._publisher.show([recording_status(self._judge.begin(at), counts, self._storage.state(), end)])

@@ -11,16 +11,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from ...bag.metadata import Recorded
 from ...bag.writer import recorded
-from ...config.yaml_text import plain, with_value
+from ...config.yaml_text import with_values
 from ...errors import UsageError
 from ...messages.topic_table import NODE, Qos, Topic, Topics
 from ...messages.type_store import jazzy
 from ..runtime import message_class, qos_profile
 
 _BASE = {"double": "float64", "float": "float32", "boolean": "bool", "octet": "byte"}
-_ARRAY = re.compile(r"^(?P<element>.+)\[(?P<count>\d+)\]$")
-_SEQUENCE = re.compile(r"^sequence<(?P<element>[^,]+)(?:, (?P<bound>\d+))?>$")
-_STRING = re.compile(r"^(?P<kind>w?string)<(?P<bound>\d+)>$")
 _EMPTY = "uint8 structure_needs_at_least_one_member\n"  # field of an empty message in CDR
 _RULE = "=" * 80
 
@@ -67,28 +64,18 @@ def _fields(kind: Any) -> tuple[str, list[str]]:
     """Return one line for each field, and the types in them."""
     lines, inner = [], []
     for name, described in kind.get_fields_and_field_types().items():
-        text, used = _spelled(described)
+        text = _spelled(described)
         lines.append(f"{text} {name}\n")
-        inner += [f"{used.split('/')[0]}/msg/{used.split('/')[1]}"] if "/" in used else []
+        package, slash, element = text.partition("[")[0].partition("/")
+        inner += [f"{package}/msg/{element}"] if slash else []
     return "".join(lines) or _EMPTY, inner
 
 
-def _spelled(described: str) -> tuple[str, str]:
-    """Return a field's type as a .msg file writes it, and the type of its elements."""
-    if match := _ARRAY.match(described):
-        element = _element(match["element"])
-        return f"{element}[{match['count']}]", element
-    if match := _SEQUENCE.match(described):
-        element = _element(match["element"])
-        return f"{element}[{'<=' + match['bound'] if match['bound'] else ''}]", element
-    element = _element(described)
-    return element, element
-
-
-def _element(described: str) -> str:
-    if match := _STRING.match(described):
-        return f"{match['kind']}<={match['bound']}"
-    return _BASE.get(described, described)
+def _spelled(described: str) -> str:
+    """Return a field's type as a .msg file writes it."""
+    text = re.sub(r"^sequence<([^,]+)(?:, (\d+))?>$", lambda m: f"{m[1]}[{'<=' + m[2] if m[2] else ''}]", described)
+    text = re.sub(r"^(w?string)<(\d+)>", r"\1<=\2", text)
+    return re.sub(rf"^({'|'.join(_BASE)})\b", lambda m: _BASE[m[1]], text)
 
 
 def _short(name: str) -> str:
@@ -165,7 +152,7 @@ def resolved_mapping(text: str, topics: Topics, node: Any) -> str:
 
 def with_mapped(text: str, place: tuple[str, ...], value: str) -> str:
     """Return the text of a mapping with another value at one place."""
-    return with_value(text if plain(text) else "{}", place, value)
+    return with_values(text, [(place, value)])
 
 
 def subscription_of(node: Any, wanted: RequestedTopic) -> tuple[Any, QoSProfile, Recorded] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import cycle
 from typing import Any
@@ -13,7 +13,7 @@ from rclpy.duration import Infinite
 from rclpy.node import Node
 from rclpy.qos import LivelinessPolicy, QoSCompatibility, QoSProfile, qos_check_compatible
 
-from ...bag.joint_names import extra_names_message, strange_names_message
+from ...bag.advice import extra_names_message, strange_names_message
 from ...config.settings import Thresholds
 from ...diagnostics.levels import Level, Value
 from ...diagnostics.model_status import stress_model
@@ -22,14 +22,12 @@ from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import ODDITIES, SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
-from ...twin.block_update import LoadShedding
-from ...twin.events import EVENTS, TOLD_AT_ONCE
+from ...twin.blocks import EVENTS, TOLD_AT_ONCE
 from ...twin.twin import Twin
 from ...types import NANO, Stream
 from ...types import Clock as StreamClock
-from ..diagnostics_publisher import DiagnosticsPublisher
-from ..runtime import Log, node_name, qos_profile
-from .receive_queue import LARGEST, ReceiveQueue
+from ..receive import LARGEST, ReceiveQueue
+from ..runtime import DiagnosticsPublisher, Log, node_name, qos_profile
 
 
 class GraphPeers:
@@ -107,8 +105,6 @@ WORDS = {**EVENTS, **ODDITIES, "too large": f"a message of more than {LARGEST >>
 NOT_ACTIVE, PREPARING = "not active", "preparing the model"
 TICK = 0.1  # s of steady time between checks for an urgent state
 PERIOD = 1.0  # s between diagnostics messages if nothing is urgent
-PIECE = 0.002  # s between pieces of a check; samples are processed in between
-SLOWEST = 0.02  # s between pieces on average, at most; in a flood of messages timers run late
 
 
 class Diagnostics:
@@ -122,15 +118,11 @@ class Diagnostics:
         self._publisher = DiagnosticsPublisher(node, topics.outputs[Output.DIAGNOSTICS], hardware_id)
         self._peers = GraphPeers(node, topics)
         self._timer = node.create_timer(TICK, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._pieces = node.create_timer(PIECE, self._go_on, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self._pieces.cancel()
-        self._work: Iterator[None] | None = None
-        self._newest_piece, self._is_peers_turn = 0.0, False
+        self._is_peers_turn = False
         self._due, self._active = time.monotonic() + PERIOD, False
         self._preparing_since: float | None = None
         self.watch = TwinWatch({}, {}, Thresholds())  # receives the twin's events. Every `configure` replaces it
         self._counts: dict[str, Mapping[str, int]] = {}
-        self._shedding: LoadShedding | None = None
         self._lags: Callable[[], Mapping[Stream, StreamClock]] = dict
         self._decoder: SampleDecoder | None = None
         self._scene, self._joints = "", 0
@@ -149,45 +141,30 @@ class Diagnostics:
         self.watch = TwinWatch(sensors, self._inputs, self.watch.thresholds, stress=stress)
         self._queue.oddities.clear()
         self._counts = {"samples": twin.counts, "messages": decoder.oddities, "received": self._queue.oddities}
-        self._scene, self._joints, self._decoder, self._shedding = scene, twin.plan.joints, decoder, twin.shedding
+        self._scene, self._joints, self._decoder = scene, twin.plan.joints, decoder
         self._told.clear()
         self._preparing_since = None
 
     def start(self) -> None:
         """Start watching when the node becomes active. From now on a silent input is stale."""
         self.watch.begin()
-        self._drop_work()
         self._active = True
 
     def stop(self) -> None:
         """Stop watching when the node becomes inactive."""
-        self._drop_work()
         self._active = False
 
     def _tick(self) -> None:
-        """Look up the peers of one topic at every second call, and begin a full check if it is due."""
+        """Look up the peers of one topic at every second call, and check everything if that is due."""
         self._is_peers_turn = not self._is_peers_turn
         if self._is_peers_turn:
             self._peers.look()
         now = time.monotonic()
-        if self._work is None and (now >= self._due - 0.5 * TICK or (self._active and self.watch.is_urgent())):
+        if now >= self._due - 0.5 * TICK or (self._active and self.watch.is_urgent()):
             self._due = now + PERIOD
-            self._work, self._newest_piece = self._look(), now
-            self._pieces.reset()
+            self._look()
 
-    def _go_on(self) -> None:
-        """Do the next piece of the current check, and further pieces if the timer ran late."""
-        began, self._newest_piece = self._newest_piece, time.monotonic()
-        for _ in range(1 + int((self._newest_piece - began) / SLOWEST)):
-            if self._work is None or next(self._work, self) is self:
-                self._drop_work()
-                return
-
-    def _drop_work(self) -> None:
-        self._pieces.cancel()
-        self._work = None
-
-    def _look(self) -> Iterator[None]:
+    def _look(self) -> None:
         clock = self._node.get_clock().now().nanoseconds * NANO
         told: dict[str, Value] = {"scene": self._scene}
         told |= {f"{kind}: {name}": count for kind, found in self._counts.items() for name, count in sorted(found.items())}
@@ -197,13 +174,10 @@ class Diagnostics:
         peers = self._peers
         wrong, received = self._wrong_names(), self._queue.look()
         ends = peers.publishers, peers.subscribers.values()
-        shed = self._shedding
-        left_out = {} if shed is None else {"shapes": shed.shapes, "looks at health": shed.health}
         since, idle = self._preparing_since, "" if self._active else NOT_ACTIVE
         if since is not None:
             idle, told["preparing_s"] = PREPARING, time.monotonic() - since
-        found = yield from self.watch.look(told, idle, *ends, clock, received, wrong, left_out, WORDS)
-        yield
+        found = self.watch.look(told, idle, *ends, clock, received, wrong, WORDS)
         self._tell_oddities()  # whoever sees a count finds its line in the log
         self._publisher.show(found)
         self._tell_types()

@@ -9,12 +9,13 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser
 from collections.abc import Sequence
+from threading import Event
 from typing import TYPE_CHECKING
 
 from ...errors import BoomTwinError
-from ...system.cores import use_one_blas_thread
+from ...system.processes import use_one_blas_thread
 from ...system.terminal_text import open_closed_streams
-from ..startup import StopSignal, end_with_preparation, require_rclpy
+from ..startup import end_with_preparation, on_stop_signal, require_rclpy
 
 use_one_blas_thread()
 
@@ -31,7 +32,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         require_rclpy()
-        return end_with_preparation(_run(arguments, StopSignal()))
+        stop = Event()
+        on_stop_signal(stop.set)
+        return end_with_preparation(_run(arguments, stop))
     except BoomTwinError as error:
         print(f"twin_node: {error}", file=sys.stderr)
         return 1
@@ -39,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
 
 
-def _run(arguments: list[str], stop: StopSignal) -> int:
+def _run(arguments: list[str], stop: Event) -> int:
     from rclpy.utilities import remove_ros_args
 
     from ..runtime import ros
@@ -59,12 +62,13 @@ def _run(arguments: list[str], stop: StopSignal) -> int:
             node.destroy_node()
 
 
-def _live(node: TwinNode, stop: StopSignal) -> int:
+def _live(node: TwinNode, stop: Event) -> int:
     """Start, spin, stop in order."""
-    from ..runtime import STOPPED, CallbackTurns
+    from ..receive import CallbackTurns
+    from ..runtime import STOPPED
 
     def is_over() -> bool:
-        return node.finished or stop.asked or (node.failed and node.autostart)
+        return node.finished or stop.is_set() or (node.failed and node.autostart)
 
     try:
         if node.autostart and not node.start():
@@ -74,7 +78,6 @@ def _live(node: TwinNode, stop: StopSignal) -> int:
                 node.queue.serve(turns)
     except STOPPED:
         pass
-    stop.over()
     if node.failed and node.autostart:
         return 1
     if not node.finished:

@@ -24,16 +24,13 @@ from ...messages.mapping import load_mapping
 from ...messages.report_encoder import ReportEncoder
 from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import NODE, Output
-from ...twin.driver import drive_one
-from ...twin.loaded_model import ModelPreparation
 from ...twin.twin import Twin
 from ...types import SENSORS, Report, Sample, Stream
+from ..receive import ReceiveQueue
 from ..runtime import Log, message_class, one_line, qos_profile
-from .background_task import BackgroundTask
+from .beside import BackgroundTask, MonitorProcess
 from .diagnostics import Diagnostics
-from .monitor_process import MonitorProcess
 from .parameters import current, declare, frame_of, guard, path_of, refusal
-from .receive_queue import ReceiveQueue
 from .services import Services, StartLog
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -60,8 +57,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         self._refused = ""
-        # rclpy has no public way to answer a transition that the present state lacks, nor to ask for the state.
-        self._service_change_state.callback = partial(self._change_state, self._service_change_state.callback)
+        transitions = next(each for each in self.services if each.service_name.endswith("/change_state"))
+        transitions.callback = partial(self._change_state, transitions.callback)
         declare(self)
         self._topics = load_mapping(path_of(self, "mapping"))
         self.queue = ReceiveQueue()
@@ -98,7 +95,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             return change(request, response)
         except RuntimeError as error:  # RCLError
             asked = request.transition.label or request.transition.id
-            told = f"transition {asked} refused in state {self._state_machine.current_state[1]}: {one_line(error)}"
+            state = "active" if self._is_active else "inactive" if self._is_configured else "unconfigured"
+            told = f"transition {asked} refused in state {'finalized' if self.finished else state}: {one_line(error)}"
             if told != self._refused:  # not a line for each of many
                 self._log.warning(told)
             self._refused, response.success = told, False
@@ -184,7 +182,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             return twin
 
         def use(twin: Twin) -> None:
-            self._decoder, self._preparation = SampleDecoder(joints, topics), ModelPreparation(twin)
+            self._decoder = SampleDecoder(joints, topics)
             self._encoder = ReportEncoder(scene, settings, frame)
             self._diagnostics.configure(twin, self._decoder, name)
             acknowledge, is_heard = self._diagnostics.watch.acknowledge, lambda: bool(self._subscriptions_in)
@@ -212,7 +210,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         """Start listening, if the node is active and the model is ready."""
         if self._twin is None or not self._is_active:
             return
-        self._preparation.finish()
         self._twin.renew()
         self._diagnostics.start()
         gc.collect()
@@ -232,7 +229,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         asked = {name: value for name, value in live.items() if name in Settings.live_names()}
         if asked and self._twin is not None:
             self.queue.catch_up()
-            self._preparation.tune(asked)
+            self._twin.requests.tune(asked)
 
     def _stop_listening(self) -> None:
         self._is_active = False
@@ -251,7 +248,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self._making.abandon()
         if self._twin is not None:
             self._twin_services.close()
-            self._preparation.close()
         self._twin = None
         if self._page is not None:
             self._page.close()
@@ -275,11 +271,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     def _take(self, sample: Sample) -> None:
         assert self._twin is not None
         self._diagnostics.watch.seen(sample.stream, sample.stamp)
-        self._preparation.take_in()
-        self._twin.shedding.filled(self.queue.share)
-        step = drive_one(self._twin, sample, judged=False)
-        self._diagnostics.watch.took(*step)
-        for each in step.report.all:
+        began = perf_counter()
+        report = self._twin.update(sample, judged=False)
+        self._diagnostics.watch.took(sample, report, perf_counter() - began)
+        for each in report.all:
             if each.change is not None:
                 self._start_log.tell(each, each.change)
             self._publish(each)

@@ -1,15 +1,15 @@
-"""Checks of a scene beyond single values: the partly validated scene that they look at, and what they find."""
+"""Checks of a scene beyond single values: the scene with the document that it was read from, and what the checks find."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from ...config.yaml_text import Document, Place
 from ...errors import Fault
-from ..schema import Base, Clearance, Joint, Material, Modes, Point, Section, Tip
+from ..schema import Scene
 
 Findings = Iterator[Fault]
 """Faults and warnings, as a check yields them."""
@@ -17,32 +17,10 @@ Findings = Iterator[Fault]
 
 @dataclass(frozen=True)
 class Draft:
-    """Parts that are well formed by themselves; ``None`` where one is not, or is not there.
+    """A scene whose values are good one by one, and its document, which gives lines."""
 
-    The fields are those of `boom_twin.scene.schema.Scene`; `document` gives lines.
-    """
-
-    document: Document = field(default_factory=Document)
-    gravity: Point | None = None
-    material: Material | None = None
-    base: Base | None = None
-    modes: Modes = 3
-    axial: bool = True
-    geometric: bool = True
-    sections: tuple[Section | None, ...] = ()
-    joints: tuple[Joint | None, ...] = ()
-    tip: Tip | None = None
-    line_fill: float | None = None
-    clearance: Clearance | None = None
-    postures: dict[str, tuple[float, ...]] = field(default_factory=dict)
-
-    def section(self, index: int) -> Section | None:
-        """Return the section `index` (0-based), None where there is no usable one."""
-        return self.sections[index] if 0 <= index < len(self.sections) else None
-
-    def modes_of(self, section: Section) -> int:
-        """Return the bending coordinates per flexible part of a section of this draft."""
-        return self.modes if section.modes is None else section.modes
+    document: Document
+    scene: Scene
 
     def fault(self, place: Place, value: Any, bound: str, remedy: str) -> Fault:
         """Return a fault: the scene cannot be used."""

@@ -1,7 +1,10 @@
-"""Geometry of a scene: pins and centres of mass on their parts; a joint over its range.
+"""Geometry of a scene: pins on their parts; a joint over its range; pins in the way of a cylinder.
 
 Over its range the links of a joint meet, its strokes are within reach and unique, it keeps clear of dead centres, and it holds
 the named postures.
+
+A cylinder lies amid the section, where the pivot's pin and those of the links pass through. Its barrel is taken as thick as its
+bore and two walls, its rod as thick as it is, a pin as half the bore. Only `oil` gives them: a cylinder with `k` is not judged.
 """
 
 from __future__ import annotations
@@ -9,16 +12,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...config.yaml_text import Place
+from ...errors import Fault
 from ...types import Array
-from ..kinematics import joint_curve, linkage_of
-from ..schema import Joint, Point, Section
+from ..kinematics import joint_curve, joint_pins, linkage, rod_pin_of
+from ..schema import Cylinder, Joint, Oil, Point, Scene
 from . import Draft, Findings
-from .values import NEEDED
 
 ROUNDING = 1e-9  # m, deg
 RIGID = (math.inf, -math.inf)  # ends of the flexible part of a rigid section: every pin is on its root and on its head
@@ -34,66 +38,46 @@ Mask = NDArray[np.bool_]
 
 def placed_pins(draft: Draft) -> Findings:
     """Check that D is on the rigid head of the section before, E on the rigid root of its own, C near the section before."""
-    for i, joint in enumerate(draft.joints):
-        before, own = draft.section(i - 1), draft.section(i)
-        if i == 0 or joint is None:
-            continue
-        if before is not None and joint.C is not None and _far(before.length, (before.length + joint.C[0], joint.C[1])):
-            bound = f"C lies far outside sections[{i - 1}], which is {before.length:g} m long"
+    scene = draft.scene
+    for i, joint in enumerate(scene.joints[1:], 1):
+        assert joint.C is not None and joint.D is not None and joint.E is not None
+        length, first, last = scene.sections[i - 1].length, _bending(scene, i - 1)[1], _bending(scene, i)[0]
+        if _far(length, (length + joint.C[0], joint.C[1])):
+            bound = f"C lies far outside sections[{i - 1}], which is {length:g} m long"
             remedy = "C is measured from the OUTBOARD pivot of the section before, so its x is negative."
             yield draft.warning(("joints", i, "C"), joint.C, bound, remedy)
-        first = -math.inf if before is None else _bending(draft, before)[1] - before.length
-        if before is not None and joint.D is not None and joint.D[0] < first - ROUNDING:
-            bound = f"D must lie on the rigid head of sections[{i - 1}], x >= {first:.6g} m from its outboard pivot"
-            remedy = f"Move D, or end the beam of sections[{i - 1}] at x1 <= {before.length + joint.D[0]:.6g} m."
+        if joint.D[0] < first - length - ROUNDING:
+            bound = f"D must lie on the rigid head of sections[{i - 1}], x >= {first - length:.6g} m from its outboard pivot"
+            remedy = f"Move D, or end the beam of sections[{i - 1}] at x1 <= {length + joint.D[0]:.6g} m."
             yield draft.fault(("joints", i, "D"), joint.D, bound, remedy)
-        if own is not None and joint.E is not None and joint.E[0] > (last := _bending(draft, own)[0]) + ROUNDING:
+        if joint.E[0] > last + ROUNDING:
             bound = f"E must lie on the rigid root of sections[{i}], x <= {last:.6g} m from its inboard pivot"
             remedy = f"Move E, or start the beam of sections[{i}] at x0 >= {joint.E[0]:.6g} m."
             yield draft.fault(("joints", i, "E"), joint.E, bound, remedy)
 
 
-def _bending(draft: Draft, section: Section) -> Point:
-    """Return the ends of the flexible part; inf, -inf if it is rigid or its ends are wrong, which another check says."""
-    beam = section.beam if section.beam is not None and draft.modes_of(section) > 0 else RIGID
-    return beam if 0 <= beam[0] < beam[1] <= section.length else RIGID
+def _bending(scene: Scene, i: int) -> Point:
+    """Return the ends of the flexible part of section `i`; inf, -inf if it is rigid."""
+    return scene.sections[i].beam or RIGID if scene.is_flexible(i) else RIGID
 
 
 def thin_parts(draft: Draft) -> Findings:
     """Yield warnings of pins just beside an end of the beam, which cut off a sliver of it."""
-    for i, section in enumerate(draft.sections):
-        if section is None:
-            continue
-        following = draft.joints[i + 1] if i + 1 < len(draft.joints) else None
-        if following is not None and following.C is not None:
-            yield from _sliver(draft, section, ("joints", i + 1, "C"), following.C, section.length + following.C[0])
-        if i == 0 and section.rod_pin is not None:
-            yield from _sliver(draft, section, ("sections", i, "rod_pin"), section.rod_pin, section.rod_pin[0])
+    for i, section in enumerate(draft.scene.sections):
+        pins: list[tuple[Place, Point, float]] = []
+        if i + 1 < len(draft.scene.joints) and (c := draft.scene.joints[i + 1].C) is not None:
+            pins.append((("joints", i + 1, "C"), c, section.length + c[0]))
+        if section.rod_pin is not None:
+            pins.append((("sections", i, "rod_pin"), section.rod_pin, section.rod_pin[0]))
+        beam = _bending(draft.scene, i)
+        for place, value, x in pins:
+            for end in beam if beam[0] < x < beam[1] else ():
+                if ROUNDING < abs(x - end) < 0.01 * section.length:
+                    bound = f"the pin splits the beam {abs(x - end) * 1e3:.3g} mm from its end, at x = {end:g} m"
+                    yield draft.warning(place, value, bound, f"Let the beam end at the pin, x = {x:.6g} m, or move the pin.")
 
 
-def _sliver(draft: Draft, section: Section, place: Place, value: Point, x: float) -> Findings:
-    beam = _bending(draft, section)
-    for end in beam:
-        if ROUNDING < abs(x - end) < 0.01 * section.length and beam[0] < x < beam[1]:
-            bound = f"the pin splits the beam {abs(x - end) * 1e3:.3g} mm from its end, at x = {end:g} m"
-            yield draft.warning(place, value, bound, f"Let the beam end at the pin, x = {x:.6g} m, or move the pin.")
-
-
-def centres(draft: Draft) -> Findings:
-    """Check that centres of mass, and the rod pin, are near their section."""
-    for i, section in enumerate(draft.sections):
-        if section is None:
-            continue
-        parts: list[tuple[Place, Point | None]] = [(("rod_pin",), section.rod_pin)]
-        parts += [((end, "com"), part.com) for end, part in (("root", section.root), ("head", section.head)) if part]
-        for place, point in parts:
-            if point is not None and _far(section.length, point):
-                bound = f"it lies far outside the section, which is {section.length:g} m long"
-                remedy = "It is measured from the inboard pivot, along the section."
-                yield draft.warning(("sections", i, *place), point, bound, remedy)
-
-
-def _far(length: float, point: tuple[float, float]) -> bool:
+def _far(length: float, point: Point) -> bool:
     """Return True if a point is more than a quarter of the length beyond the section's ends, or half of it beside."""
     return not -0.25 * length <= point[0] <= 1.25 * length or abs(point[1]) > 0.5 * length
 
@@ -103,14 +87,13 @@ def _far(length: float, point: tuple[float, float]) -> bool:
 
 def joints(draft: Draft) -> Findings:
     """Check every joint over its range_deg: closing, reach, uniqueness, and the named postures in it."""
-    for i, joint in enumerate(draft.joints):
-        if joint is None or not -360 <= joint.range_deg[0] < joint.range_deg[1] <= 360:
-            continue
-        row = geometry_of(draft, i)
-        findings = [] if row is None else list(_curve(draft, i, joint, row))
+    for i, joint in enumerate(draft.scene.joints):
+        row = linkage(draft.scene, i)
+        findings = list(_curve(draft, i, joint, row))
         yield from findings
-        blocked = row is None or any(finding.kind == "fault" for finding in findings)
-        for name, degrees in _postures(draft, i):
+        blocked = any(finding.kind == "fault" for finding in findings)
+        for name, angles in draft.scene.postures.items():
+            degrees = angles[i] - (angles[i - 1] if i > 0 else 0.0)
             yield from _posture(draft, (name, i), joint, degrees, None if blocked else row)
 
 
@@ -254,34 +237,16 @@ def usable(degrees: Array, lengths: Array) -> tuple[float, float]:
     return (whole_low, whole_high) if whole_low < whole_high else (low, high)
 
 
-def geometry_of(draft: Draft, i: int) -> np.record | None:
-    """Return the geometry of joint `i`; None if it is not complete."""
-    joint, first = draft.joints[i], draft.section(0)
-    if joint is None or (i == 0) != (joint.kind == "A"):
-        return None
-    if joint.kind == "A":
-        complete = draft.base is not None and first is not None and first.rod_pin is not None
-    else:
-        complete = all(getattr(joint, key) is not None for key in NEEDED[joint.kind])
-    return linkage_of(joint, draft.base, first) if complete else None
-
-
 def _reached(joint: Joint, lengths: Array) -> Mask:
     """Return a mask of the angles at which the cylinder can be as long as the geometry asks; False where links do not meet."""
     strokes = lengths - joint.cylinder.closed_length
     return (strokes >= -ROUNDING) & (strokes <= joint.cylinder.max_stroke + ROUNDING)
 
 
-def _postures(draft: Draft, i: int) -> Iterator[tuple[str, float]]:
-    for name, angles in draft.postures.items():
-        if len(angles) == len(draft.joints):
-            yield name, angles[i] - (angles[i - 1] if i > 0 else 0.0)
-
-
 def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, row: np.record | None) -> Findings:
     """Check joint `who[1]` in posture `who[0]`: its angle in range_deg and, if its geometry is known, its stroke."""
     name, i = who
-    place, value = ("postures", name, i), draft.postures[name][i]
+    place, value = ("postures", name, i), draft.scene.postures[name][i]
     low, high = joint.range_deg
     says = f"posture `{name}` turns joint {i + 1} to {degrees:g} deg"
     if not low - ROUNDING <= degrees <= high + ROUNDING:
@@ -303,3 +268,80 @@ def intervals(degrees: Array, mask: Mask) -> str:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
     return ", ".join(f"{degrees[first]:.1f} to {degrees[last]:.1f} deg" for first, last in pairs)
+
+
+# -- pins in the way of a cylinder ----------------------------------------------------------------------------------------
+
+PIN = 0.5  # diameter of a pin over the bore
+WALL = 0.12  # of a barrel, over its bore
+BARREL = 0.9  # of the closed length; the rest is the rod's end and its eye
+
+
+def distances_to(point: Array, start: Array, end: Array) -> tuple[Array, Array]:
+    """Return the distance (m) of points from the line between two others, and where on it (0 to 1) that is; all x + iy."""
+    along = end - start
+    place = np.clip(((point - start) * along.conj()).real / np.abs(along) ** 2, 0.0, 1.0)
+    return np.abs(point - start - place * along), place
+
+
+class Pass(NamedTuple):
+    """A pin that a cylinder passes: its name, and at each angle the distance (m), what is needed, and whether of the barrel."""
+
+    pin: str
+    distance: Array
+    needed: Array
+    at_barrel: Mask
+
+
+def clear_cylinders(draft: Draft) -> Findings:
+    """Check all cylinders that have `oil`; of each the pin that is closest against what it needs."""
+    scene = draft.scene
+    for i, joint in enumerate(scene.joints):
+        if joint.cylinder.oil is not None:
+            degrees = grid_of(joint)
+            passes = list(passes_of(scene, i, joint.cylinder, joint.cylinder.oil, np.radians(degrees)))
+            worst = min(passes, key=lambda each: float(np.nanmin(each.distance / each.needed)), default=None)
+            if worst is not None and np.nanmin(worst.distance / worst.needed) < 1.0:
+                clear = np.all([each.distance >= each.needed for each in passes], axis=0)
+                yield _finding(draft, scene, i, worst, degrees, clear)
+
+
+def _finding(draft: Draft, scene: Scene, i: int, worst: Pass, degrees: Array, clear: Array) -> Fault:
+    at = int(np.nanargmin(worst.distance / worst.needed))
+    part, size = ("barrel", "half the barrel") if worst.at_barrel[at] else ("rod", "half the rod")
+    bound = (
+        f"at {degrees[at]:.0f} deg the {part} of cylinder {i + 1} passes {worst.distance[at]:.3f} m from {worst.pin}, where a "
+        f"boom has a pin; expected at least {worst.needed[at]:.3f} m, {size} and half a pin of half the bore"
+    )
+    pins = "C, D, E or the lengths of the links" if i else "cylinder_pin or rod_pin"
+    low, high = usable(degrees, np.where(clear, degrees, np.nan))
+    narrower = f", or narrow range_deg to [{low:g}, {high:g}]" if low < high else ""
+    place: Place = ("joints", i, "C") if i else ("base", "cylinder_pin")
+    value = scene.joints[i].C if i else scene.base.cylinder_pin
+    return draft.warning(place, value, bound, f"Look at `check --picture`; move {pins}{narrower}.")
+
+
+def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) -> Iterator[Pass]:
+    """Return the pins beside the cylinder's own two, in the axes of its carrier, as complex numbers x + iy, m."""
+    pins = joint_pins(scene, i, phi)
+    foot, rod_pin = pins.pop("C" if i else "cylinder_pin"), pins.pop(rod_pin_of(pins))
+    length = np.abs(rod_pin - foot)
+    for name, pin in (pins | _pins_before(scene, i, pins["the pivot"])).items():
+        distance, place = distances_to(pin, foot, rod_pin)
+        at_barrel = place * length < BARREL * cylinder.closed_length
+        radius = np.where(at_barrel, (0.5 + WALL) * oil.bore, 0.5 * oil.rod)
+        yield Pass(name, distance, radius + 0.5 * PIN * oil.bore, at_barrel)
+
+
+def _pins_before(scene: Scene, i: int, pivot: Array) -> dict[str, Array]:
+    """Return the pins at the inboard end of the carrier of joint `i`, each shape as `pivot`."""
+    if i == 0:
+        return {}
+    carrier, before = scene.sections[i - 1], scene.joints[i - 1]
+    inner = carrier.rod_pin if i == 1 else before.E
+    found = {"the pivot before": pivot - carrier.length}
+    if inner is not None:
+        found["rod_pin of section 1" if i == 1 else "E of the joint before"] = np.asarray(
+            pivot + (complex(*inner) - carrier.length)
+        )
+    return found

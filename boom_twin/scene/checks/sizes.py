@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from ...config.yaml_text import Place
-from ..schema import DEPTH_BY_GYRATION, Cylinder, Joint, Point, RigidPart, Scene, Section
+from ..schema import DEPTH_BY_GYRATION, Cylinder, Point, RigidPart, Scene
 from . import Draft, Findings
 
 LENGTHS = ("length", "beam", "height", "rod_pin", "com", "pivot", "cylinder_pin", "C", "D", "E", "R", "lL", "lR",
@@ -66,14 +66,15 @@ SUSPECTS = (
 
 def suspects(draft: Draft) -> Findings:
     """Check the size of all values of all usable parts."""
-    blocks: list[tuple[Place, Any]] = [(("material",), draft.material), (("base",), draft.base), (("tip",), draft.tip)]
-    blocks += [(("sections", i), section) for i, section in enumerate(draft.sections)]
-    blocks += [(("joints", i), joint) for i, joint in enumerate(draft.joints)]
-    for place, block in [*blocks, (("line_fill",), draft.line_fill)]:
+    scene = draft.scene
+    blocks: list[tuple[Place, Any]] = [((key,), getattr(scene, key)) for key in ("material", "base", "tip", "line_fill")]
+    blocks += [(("sections", i), section) for i, section in enumerate(scene.sections)]
+    blocks += [(("joints", i), joint) for i, joint in enumerate(scene.joints)]
+    for place, block in blocks:
         if block is not None:
             yield from _block(draft, place, block)
     yield from _gravity(draft)
-    for name, angles in draft.postures.items():
+    for name, angles in scene.postures.items():
         if angles and max(map(abs, angles)) < 6.3 and any(angle != round(angle) for angle in angles):
             yield draft.warning(("postures", name), angles, "all within 6.3: radians?", "Give degrees to the horizontal.")
 
@@ -115,44 +116,104 @@ def _narrow(draft: Draft, place: Place, value: tuple[float, float]) -> Findings:
 
 
 def _gravity(draft: Draft) -> Findings:
-    if draft.gravity is not None:
-        wrong = ""
-        if not 9.7 < math.hypot(*draft.gravity) < 9.9:
-            wrong = "its size is not that of the earth's gravity, about 9.81 m/s^2"
-        elif draft.gravity[1] > 0:
-            wrong = "it points upwards"
-        elif abs(draft.gravity[0]) > TILT * abs(draft.gravity[1]):
-            wrong = "it does not point along -y, which is down"
-        if wrong:
-            yield draft.warning(("gravity",), draft.gravity, wrong, "Give [0.0, -9.81]; a slope is base.inclination, rad.")
+    gravity, wrong = draft.scene.gravity, ""
+    if not 9.7 < math.hypot(*gravity) < 9.9:
+        wrong = "its size is not that of the earth's gravity, about 9.81 m/s^2"
+    elif gravity[1] > 0:
+        wrong = "it points upwards"
+    elif abs(gravity[0]) > TILT * abs(gravity[1]):
+        wrong = "it does not point along -y, which is down"
+    if wrong:
+        yield draft.warning(("gravity",), gravity, wrong, "Give [0.0, -9.81]; a slope is base.inclination, rad.")
 
 
 # -- parts against each other -----------------------------------------------------------------------------------------
 
-GYRATION_BY_HEIGHT = (0.28, 0.5)  # a solid block has 0.289, two thin flanges 0.5
-GYRATION_BY_LENGTH = (0.004, 0.05)
-COMPACTNESS = (0.12, 2.0)  # A^2 / I: a box with walls of about 1/170 and of a tenth of its height
-MASS_BY_STEEL, SLACK = (1.0, 4.0), 1e-3  # of a value that was rounded
-ROTARY_BY_STEEL = (0.3, 30.0)
-TAPER = (1 / 40, 1.5)  # of EI against the section before
+WALL = 20.7  # the wall of a thin box is A^2/(I WALL) of its depth, DEPTH_BY_GYRATION radii of gyration
+SLACK = 1e-3  # of a value that was rounded
 LEAST_BEAM = 0.6  # of the length
 LONGEST_HEAD = 0.125  # of the length
-WALL = 20.7  # the wall of a thin box is A^2/(I WALL) of its depth, DEPTH_BY_GYRATION radii of gyration
 STEEL, STEEL_E = 7850.0, (1.9e11, 2.2e11)
-STEEL_RHO, OF_STEEL = (7700.0, 8000.0), (1.7e11, 2.3e11)  # densities that only steel has, and its E with a wide margin
+STEEL_RHO = (7700.0, 8000.0)  # densities that only steel has
 SPECIFIC_STIFFNESS = (8e6, 1.2e8)  # E / rho, m^2/s^2: glass fibre 1e7, metals 2.6e7, carbon fibre 9e7
-
 OVERHANG = 0.05  # of the section's length, that a rigid part may reach beyond the pivots
 BESIDE = 2.0  # depths of the section, that a centre may lie beside its axis
-LARGEST_GYRATION = 0.6  # of the size of a part
 LIGHTEST_PART, LONG_PART = 0.2, 0.03  # of the beam's mass per metre, in parts longer than a share of the section
-ROD_BY_BEAM = (0.01, 10.0)  # mass per metre of barrels and rods against that of the section
-LINK_BY_BEAM = (0.01, 1.5)  # mass per metre of links against that of the section
-CYLINDER_GYRATION = (0.05, 0.5)  # of the closed length; a uniform rod has 0.29
-CYLINDER_CENTRE = 0.8  # of the closed length
-LONGEST_STROKE = 0.95  # of the closed length
-LONGEST_CYLINDER = 0.5  # of the section that it lies along: closed length
-LINE = (1e-3, 2.0)  # oil between piston and valve, of what the chamber takes
+
+
+class Ratio(NamedTuple):
+    """Value of a key over a measure, both of one part; texts are formatted with the part's quantities."""
+
+    key: str
+    limits: tuple[float, float]
+    by: str  # quantity that the limits are multiples of; the value is not judged without it
+    where: str
+    remedy: str
+    measured: str = ""  # quantity that is judged instead of the value
+    says: str = ""
+
+
+_RADIUS = "a radius of gyration of {radius:.3g} m; "
+_BOX_RADIUS = "its radius of gyration, sqrt(I/A), is {radius:.3g} m; "
+_BOX = "with A = {A:g} m^2 this is a box about {depth:.2g} m high with walls of {wall:.2g} mm; "
+_CLOSED = " m: closed, the cylinder is {closed_length:g} m long"
+_WEIGHS = " kg for {length:g} m beside a section of {per_metre:.3g} kg/m"
+_PART = " kg for a part {length:.2g} m long and {depth:.2g} m high"
+_KG = "Give kg: not grams, not tonnes, not N."
+_PART_KG = "Give kg: not grams, not tonnes; and check beam: [x0, x1]."
+_LINE, _LITRES = " m^3, a thousandth to twice what the chamber takes", "Give m^3: half a litre is 5e-4."
+
+MATERIAL = (
+    Ratio("E", SPECIFIC_STIFFNESS, "rho", " Pa with a density of {rho:g} kg/m^3", "Steel has 2.06e11 Pa and 7850 kg/m^3."),
+    Ratio("E", (1.7e11, 2.3e11), "of_steel", " Pa with the density of steel, {rho:g} kg/m^3",
+          "Check E, or give the density of this material."),
+)  # fmt: skip
+BEAM = (
+    Ratio("I", (0.28, 0.5), "height", " for a box {height:g} m high", "Check I (m^4), A (m^2) and height (m).", "radius",
+          _BOX_RADIUS),  # a solid block has 0.289, two thin flanges 0.5
+    Ratio("I", (0.004, 0.05), "length", " for a section of {length:g} m",
+          "Check I (m^4), A (m^2) and length (m), decimals and units.", "radius", _BOX_RADIUS),
+    Ratio("I", (0.12, 2.0), "thin_wall", " mm", "Check the decimals of I (m^4) and A (m^2).", "wall", _BOX),
+    Ratio("rho_A", (1.0, 4.0), "steel", " kg/m: the box alone, rho A, has {steel:.3g}",
+          "Give the mass of one metre of beam: box, pipe line, hoses, without concrete (line_fill).", "slack"),
+    Ratio("rho_I", (0.3, 30.0), "rotary", " kg m: the box alone, rho I, has {rotary:.3g}", "Give rho I, or leave it out."),
+    Ratio("I", (1 / 40, 1.5), "before", " m^4 after the section before with I = {before:g}",
+          "Booms taper outwards: check the decimals of both."),
+)  # fmt: skip
+RIGID_PART = (
+    Ratio("inertia", (0.0, 0.6), "size", " m for its size",
+          "Give kg m^2 about the part's OWN centre of mass: m (a^2 + b^2) / 12 of the block around it.", "radius", _RADIUS),
+    Ratio("mass", (1.0, math.inf), "lightest", _PART, _PART_KG),
+    Ratio("mass", (0.0, 1.0), "heaviest", _PART, _PART_KG),
+)  # fmt: skip
+LINK = (Ratio("mass", (0.01, 1.5), "beside", _WEIGHS, _KG),)
+CYLINDER_PART = (
+    Ratio("com", (0.0, 0.8), "closed_length", _CLOSED, "Barrels count from the barrel pin, rods from the rod pin."),
+    Ratio("inertia", (0.05, 0.5), "closed_length", " m for a cylinder of {closed_length:g} m",
+          "Give kg m^2 about the part's own centre of mass.", "radius", _RADIUS),  # a uniform rod has 0.29
+    Ratio("mass", (0.01, 10.0), "beside", _WEIGHS, _KG),
+)  # fmt: skip
+CYLINDER = (
+    Ratio("max_stroke", (0.0, 0.95), "closed_length", _CLOSED,
+          "Give the stroke, not the open length; closed_length is pin to pin with the rod all the way in."),
+    Ratio("closed_length", (0.0, 0.5), "carrier", " m beside a section of {carrier:g} m",
+          "Check the pins at its ends: C from the outboard pivot, cylinder_pin from the same origin as pivot."),
+)  # fmt: skip
+OIL = (
+    Ratio("cap_line", (1e-3, 2.0), "cap_volume", _LINE, _LITRES),
+    Ratio("rod_line", (1e-3, 2.0), "rod_volume", _LINE, _LITRES),
+)
+
+
+def _judged(draft: Draft, rows: tuple[Ratio, ...], place: Place, **part: Any) -> Findings:
+    """Yield a warning for each ratio of a part that is out of its limits; `part` has its values and other quantities."""
+    for row in rows:
+        value, unit = part.get(row.key), part.get(row.by)
+        if value and unit:
+            here = place if rows is LINK else (*place, row.key)
+            measured = part[row.measured] if row.measured else value
+            texts = (row.where.format(**part), row.remedy)
+            yield from draft.expect(here, value, row.limits, unit, *texts, measured=measured, says=row.says.format(**part))
 
 
 def _between(value: float, limits: tuple[float, float], unit: float = 1.0) -> bool:
@@ -170,57 +231,29 @@ def density(scene: Scene) -> float | None:
     return known if _between(stiffness, SPECIFIC_STIFFNESS, known) else None
 
 
-def material(draft: Draft, scene: Scene) -> Findings:
+def material(draft: Draft) -> Findings:
     """Check Young's modulus against the density."""
-    place, value, rho = ("material", "E"), scene.material.E, scene.material.rho
-    if rho is not None:
-        where, remedy = f" Pa with a density of {rho:g} kg/m^3", "Steel has 2.06e11 Pa and 7850 kg/m^3."
-        yield from draft.expect(place, value, SPECIFIC_STIFFNESS, rho, where, remedy)
-        if _between(rho, STEEL_RHO):
-            where, remedy = f" Pa with the density of steel, {rho:g} kg/m^3", "Check E, or give the density of this material."
-            yield from draft.expect(place, value, OF_STEEL, 1.0, where, remedy)
+    scene = draft.scene
+    rho = scene.material.rho
+    of_steel = 1.0 if rho is not None and _between(rho, STEEL_RHO) else None
+    yield from _judged(draft, MATERIAL, ("material",), E=scene.material.E, rho=rho, of_steel=of_steel)
 
 
-def beams(draft: Draft, scene: Scene) -> Findings:
+def beams(draft: Draft) -> Findings:
     """Check all sections that have a beam."""
+    scene = draft.scene
+    rho, before = density(scene), None
     for i, section in enumerate(scene.sections):
         if section.beam is not None and section.A is not None and section.I is not None:
-            yield from _box(draft, i, section, section.A, section.I)
-            if (rho := density(scene)) is not None:
-                yield from _per_metre(draft, i, section, rho * section.A, rho * section.I)
+            radius = math.sqrt(section.I / section.A)
+            thin_wall = 1e3 * DEPTH_BY_GYRATION * radius / WALL
+            own = section.model_dump(include={"length", "height", "A", "I", "rho_A", "rho_I"})
+            own |= {"radius": radius, "depth": DEPTH_BY_GYRATION * radius, "thin_wall": thin_wall, "before": before}
+            own |= {"wall": thin_wall * section.A**2 / section.I, "slack": (section.rho_A or 0.0) * (1.0 + SLACK)}
+            own |= {} if rho is None else {"steel": rho * section.A, "rotary": rho * section.I}
+            yield from _judged(draft, BEAM, ("sections", i), **own)
             yield from _ends(draft, i, section.length, section.beam)
-            before = scene.sections[i - 1].I if i > 0 else None
-            if before is not None:
-                where, remedy = (
-                    f" m^4 after sections[{i - 1}] with I = {before:g}",
-                    "Booms taper outwards: check the decimals of both.",
-                )
-                yield from draft.expect(("sections", i, "I"), section.I, TAPER, before, where, remedy)
-
-
-def _box(draft: Draft, i: int, section: Section, area: float, inertia: float) -> Findings:
-    place, radius = ("sections", i, "I"), math.sqrt(inertia / area)
-    judged: dict[str, Any] = {"measured": radius, "says": f"its radius of gyration, sqrt(I/A), is {radius:.3g} m; "}
-    if section.height is not None:
-        where, remedy = f" for a box {section.height:g} m high", "Check I (m^4), A (m^2) and height (m)."
-        yield from draft.expect(place, inertia, GYRATION_BY_HEIGHT, section.height, where, remedy, **judged)
-    where, remedy = f" for a section of {section.length:g} m", "Check I (m^4), A (m^2) and length (m), decimals and units."
-    yield from draft.expect(place, inertia, GYRATION_BY_LENGTH, section.length, where, remedy, **judged)
-    wall, depth = 1e3 * DEPTH_BY_GYRATION * radius / WALL, DEPTH_BY_GYRATION * radius
-    says = f"with A = {area:g} m^2 this is a box about {depth:.2g} m high with walls of {wall * area**2 / inertia:.2g} mm; "
-    judged = {"measured": wall * area**2 / inertia, "says": says}
-    yield from draft.expect(place, inertia, COMPACTNESS, wall, " mm", "Check the decimals of I (m^4) and A (m^2).", **judged)
-
-
-def _per_metre(draft: Draft, i: int, section: Section, steel: float, rotary: float) -> Findings:
-    if section.rho_A is not None:
-        where = f" kg/m: the box alone, rho A, has {steel:.3g}"
-        remedy = "Give the mass of one metre of beam: box, pipe line, hoses, without concrete (line_fill)."
-        place, slack = ("sections", i, "rho_A"), section.rho_A * (1.0 + SLACK)
-        yield from draft.expect(place, section.rho_A, MASS_BY_STEEL, steel, where, remedy, measured=slack)
-    if section.rho_I:
-        where, remedy = f" kg m: the box alone, rho I, has {rotary:.3g}", "Give rho I, or leave it out."
-        yield from draft.expect(("sections", i, "rho_I"), section.rho_I, ROTARY_BY_STEEL, rotary, where, remedy)
+        before = section.I
 
 
 def _ends(draft: Draft, i: int, length: float, beam: Point) -> Findings:
@@ -235,18 +268,20 @@ def _ends(draft: Draft, i: int, length: float, beam: Point) -> Findings:
         yield draft.warning(place, beam, bound, "Give [x0, x1] from the inboard pivot: where the box begins and ends.")
 
 
-def rigid_parts(draft: Draft, scene: Scene) -> Findings:
+def rigid_parts(draft: Draft) -> Findings:
     """Check roots and heads."""
+    scene = draft.scene
     for i, section in enumerate(scene.sections):
         ends = section.beam or (section.length, section.length)
         for key, part, span in (("root", section.root, (0.0, ends[0])), ("head", section.head, (ends[1], section.length))):
             if part is not None and part.mass > 0.0:
-                yield from _part(draft, scene, ("sections", i, key), part, span)
+                yield from _part(draft, ("sections", i, key), part, span)
 
 
-def _part(draft: Draft, scene: Scene, place: tuple[str, int, str], part: RigidPart, span: tuple[float, float]) -> Findings:
+def _part(draft: Draft, place: tuple[str, int, str], part: RigidPart, span: tuple[float, float]) -> Findings:
     """Check centre, inertia and mass: at least that of a share of as much beam, at most that of a solid block of its depth."""
-    section, depth, length = scene.sections[place[1]], scene.sections[place[1]].depth, span[1] - span[0]
+    section, length = draft.scene.sections[place[1]], span[1] - span[0]
+    depth = section.depth
     more = OVERHANG * section.length
     low, high = span[0] - more, span[1] + more
     if not low <= part.com[0] <= high or abs(part.com[1]) > BESIDE * depth:
@@ -254,66 +289,36 @@ def _part(draft: Draft, scene: Scene, place: tuple[str, int, str], part: RigidPa
         remedy = "The centre of mass is measured from the INBOARD pivot, in the axes of the section."
         yield draft.warning((*place, "com"), part.com, bound, remedy)
         return
-    size, radius = math.hypot(length + more, 2.0 * depth), math.sqrt(part.inertia / part.mass)
-    remedy = "Give kg m^2 about the part's OWN centre of mass: m (a^2 + b^2) / 12 of the block around it."
-    judged: dict[str, Any] = {"measured": radius, "says": f"a radius of gyration of {radius:.3g} m; "}
-    yield from draft.expect(
-        (*place, "inertia"), part.inertia, (0.0, LARGEST_GYRATION), size, " m for its size", remedy, **judged
-    )
-    is_long = section.rho_A is not None and length > LONG_PART * section.length
-    lightest, rho = LIGHTEST_PART * (section.rho_A or 0.0) * length if is_long else 0.0, density(scene)
-    limits = lightest, math.inf if rho is None else rho * depth**2 * (length + 2.0 * depth)
-    where = f" kg for a part {length:.2g} m long and {depth:.2g} m high"
-    remedy = "Give kg: not grams, not tonnes; and check beam: [x0, x1]."
-    yield from draft.expect((*place, "mass"), part.mass, limits, 1.0, where, remedy)
+    own = {"length": length, "depth": depth, "radius": math.sqrt(part.inertia / part.mass)}
+    own |= {"mass": part.mass, "inertia": part.inertia, "size": math.hypot(length + more, 2.0 * depth)}
+    if length > LONG_PART * section.length:
+        own["lightest"] = LIGHTEST_PART * (section.rho_A or 0.0) * length
+    if (rho := density(draft.scene)) is not None:
+        own["heaviest"] = rho * depth**2 * (length + 2.0 * depth)
+    yield from _judged(draft, RIGID_PART, place, **own)
 
 
-def moving_parts(draft: Draft, scene: Scene) -> Findings:
+def moving_parts(draft: Draft) -> Findings:
     """Check links and cylinders."""
+    scene = draft.scene
     for i, (section, joint) in enumerate(zip(scene.sections, scene.joints, strict=True)):
         root = 0.0 if section.root is None else section.root.mass
         per_metre = section.rho_A if section.rho_A is not None else root / section.length
         for key, mass, length in (("mL", joint.mL, joint.lL), ("mR", joint.mR, joint.lR)):
-            if mass and length:
-                yield from _rod_mass(draft, ("joints", i, key), mass, length, per_metre, LINK_BY_BEAM)
-        yield from _cylinder(draft, i, joint, per_metre)
-        yield from _cylinder_size(draft, i, joint.cylinder, scene.sections[max(0, i - 1)].length)
+            if length:
+                own = {"mass": mass, "length": length, "per_metre": per_metre, "beside": per_metre * length}
+                yield from _judged(draft, LINK, ("joints", i, key), **own)
+        yield from _cylinder(draft, i, joint.cylinder, per_metre, scene.sections[max(0, i - 1)].length)
 
 
-def _rod_mass(
-    draft: Draft, place: Place, mass: float, length: float, per_metre: float, limits: tuple[float, float] = ROD_BY_BEAM
-) -> Findings:
-    if per_metre > 0.0:
-        where = f" kg for {length:g} m beside a section of {per_metre:.3g} kg/m"
-        yield from draft.expect(place, mass, limits, per_metre * length, where, "Give kg: not grams, not tonnes, not N.")
-
-
-def _cylinder(draft: Draft, i: int, joint: Joint, per_metre: float) -> Findings:
-    place, cylinder, closed = ("joints", i, "cylinder"), joint.cylinder, joint.cylinder.closed_length
-    where = f" m: closed, the cylinder is {closed:g} m long"
-    remedy = "Give the stroke, not the open length; closed_length is pin to pin with the rod all the way in."
-    yield from draft.expect((*place, "max_stroke"), cylinder.max_stroke, (0.0, LONGEST_STROKE), closed, where, remedy)
+def _cylinder(draft: Draft, i: int, cylinder: Cylinder, per_metre: float, carrier: float) -> Findings:
+    place, closed = ("joints", i, "cylinder"), cylinder.closed_length
+    size = {"closed_length": closed, "length": closed, "per_metre": per_metre, "beside": per_metre * closed}
+    yield from _judged(draft, CYLINDER, place, **size, max_stroke=cylinder.max_stroke, carrier=carrier)
     for key, part in (("barrel", cylinder.barrel), ("rod", cylinder.rod)):
         if part is not None and part.mass > 0.0:
-            remedy = "Barrels count from the barrel pin, rods from the rod pin."
-            yield from draft.expect((*place, key, "com"), part.com, (0.0, CYLINDER_CENTRE), closed, where, remedy)
-            radius = math.sqrt(part.inertia / part.mass)
-            if part.inertia:
-                judged: dict[str, Any] = {"measured": radius, "says": f"a radius of gyration of {radius:.3g} m; "}
-                told, remedy = f" m for a cylinder of {closed:g} m", "Give kg m^2 about the part's own centre of mass."
-                here = (*place, key, "inertia")
-                yield from draft.expect(here, part.inertia, CYLINDER_GYRATION, closed, told, remedy, **judged)
-            yield from _rod_mass(draft, (*place, key, "mass"), part.mass, closed, per_metre)
-
-
-def _cylinder_size(draft: Draft, i: int, cylinder: Cylinder, section: float) -> Findings:
-    """Check closed length against the section beside it, oil in the lines against that in the chambers."""
-    place, closed = ("joints", i, "cylinder"), cylinder.closed_length
-    remedy = "Check the pins at its ends: C from the outboard pivot, cylinder_pin from the same origin as pivot."
-    where = f" m beside a section of {section:g} m"
-    yield from draft.expect((*place, "closed_length"), closed, (0.0, LONGEST_CYLINDER), section, where, remedy)
-    if cylinder.oil is not None:
-        for key, area in (("cap_line", cylinder.oil.cap_area), ("rod_line", cylinder.oil.rod_area)):
-            if volume := getattr(cylinder.oil, key):
-                where, remedy = " m^3, a thousandth to twice what the chamber takes", "Give m^3: half a litre is 5e-4."
-                yield from draft.expect((*place, "oil", key), volume, LINE, area * cylinder.max_stroke, where, remedy)
+            own = size | part.model_dump() | {"radius": math.sqrt(part.inertia / part.mass)}
+            yield from _judged(draft, CYLINDER_PART, (*place, key), **own)
+    if (oil := cylinder.oil) is not None:
+        volumes = {"cap_volume": oil.cap_area * cylinder.max_stroke, "rod_volume": oil.rod_area * cylinder.max_stroke}
+        yield from _judged(draft, OIL, (*place, "oil"), **oil.model_dump(), **volumes)

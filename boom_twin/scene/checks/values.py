@@ -24,13 +24,11 @@ WIDE_CLEARANCE = 0.1  # of the pin's radius; contact of a journal in a bush is m
 
 def counts(draft: Draft) -> Findings:
     """Check that each section has one joint, and one angle in every posture."""
-    number = len(draft.sections)
-    if number == 0:
-        return
-    if draft.joints and len(draft.joints) != number:
+    number = len(draft.scene.sections)
+    if len(draft.scene.joints) != number:
         bound = f"there are {_several(number, 'section')}, and every section has one joint"
-        yield draft.fault(("joints",), len(draft.joints), bound, "Add or remove joints or sections.")
-    for name, angles in draft.postures.items():
+        yield draft.fault(("joints",), len(draft.scene.joints), bound, "Add or remove joints or sections.")
+    for name, angles in draft.scene.postures.items():
         if len(angles) != number:
             bound = f"it has {_several(len(angles), 'angle')}, the boom has {_several(number, 'section')}"
             remedy = "Give one angle per section, degrees to the horizontal."
@@ -39,10 +37,9 @@ def counts(draft: Draft) -> Findings:
 
 def sections(draft: Draft) -> Findings:
     """Check that flexible sections have their cross-section, rigid ones only a root, and the first one a rod pin."""
-    for i, section in enumerate(draft.sections):
-        if section is not None:
-            yield from _rigid(draft, i, section) if section.beam is None else _flexible(draft, i, section, section.beam)
-            yield from _rod_pin(draft, i, section)
+    for i, section in enumerate(draft.scene.sections):
+        yield from _rigid(draft, i, section) if section.beam is None else _flexible(draft, i, section, section.beam)
+        yield from _rod_pin(draft, i, section)
 
 
 def _flexible(draft: Draft, i: int, section: Section, beam: Point) -> Findings:
@@ -86,11 +83,9 @@ def _rod_pin(draft: Draft, i: int, section: Section) -> Findings:
 
 def modes(draft: Draft) -> Findings:
     """Yield a warning of a single bending coordinate: a part then bends as under a constant moment only."""
-    taking = [section for section in draft.sections if section is not None and section.beam is not None]
-    places: list[Place] = [
-        ("sections", i, "modes") for i, section in enumerate(draft.sections) if section in taking and section.modes == 1
-    ]
-    if draft.modes == 1 and any(section.modes is None for section in taking):
+    beams = [(i, section.modes) for i, section in enumerate(draft.scene.sections) if section.beam is not None]
+    places: list[Place] = [("sections", i, "modes") for i, own in beams if own == 1]
+    if draft.scene.modes == 1 and any(own is None for _, own in beams):
         places.insert(0, ("modes",))
     for place in places:
         bound = (
@@ -102,18 +97,17 @@ def modes(draft: Draft) -> Findings:
 
 def joints(draft: Draft) -> Findings:
     """Check kinds in their order, with the keys of their kind and no others; angles and cylinders by themselves."""
-    for i, joint in enumerate(draft.joints):
-        if joint is not None:
-            yield from _kind(draft, i, joint)
-            yield from _keys_of_kind(draft, i, joint)
-            yield from _range(draft, i, joint)
-            yield from _oil_spring(draft, i, joint.cylinder)
+    for i, joint in enumerate(draft.scene.joints):
+        yield from _kind(draft, i, joint)
+        yield from _keys_of_kind(draft, i, joint)
+        yield from _range(draft, i, joint)
+        yield from _oil_spring(draft, i, joint.cylinder)
 
 
 def base(draft: Draft) -> Findings:
     """Check that the damper of the base's hinge has its spring."""
-    own = draft.base
-    if own is not None and own.damping is not None and own.stiffness is None:
+    own = draft.scene.base
+    if own.damping is not None and own.stiffness is None:
         bound = "a damper acts in parallel with the hinge's spring, and stiffness is absent: the base is rigid"
         remedy = f"Give stiffness, {meaning_of(Base, 'stiffness')}, or remove damping."
         yield draft.fault(("base", "damping"), own.damping, bound, remedy)
@@ -182,19 +176,20 @@ def _several(number: int, noun: str) -> str:
 
 def worn_pins(draft: Draft) -> Findings:
     """Check that every pin of the block is a pin of the boom, named once, with a clearance that fits its radius."""
-    if draft.clearance is None:
+    scene, block = draft.scene, draft.scene.clearance
+    if block is None:
         return
-    law = draft.clearance.contact
+    law = block.contact
     if "restitution" in law.model_fields_set and abs(law.given_restitution - law.restitution) > NEAR_RESTITUTION:
         bound = f"the law {law.law} really gives {law.given_restitution:.3f}"
         remedy = "Take the law hunt-crossley-exact, which gives what is asked for."
         yield draft.warning(("clearance", "contact", "restitution"), law.restitution, bound, remedy)
-    there = [name for k, joint in enumerate(draft.joints) if joint is not None for name in names_of(k, joint)]
+    there = [name for k, joint in enumerate(scene.joints) for name in names_of(k, joint)]
     seen: dict[str, int] = {}
-    for i, pin in enumerate(draft.clearance.pins):
+    for i, pin in enumerate(block.pins):
         place = ("clearance", "pins", i)
-        if there and pin.at not in there and None not in draft.joints:
-            yield draft.fault((*place, "at"), pin.at, *_unknown(pin.at, draft.joints, there))
+        if pin.at not in there:
+            yield draft.fault((*place, "at"), pin.at, *_unknown(pin.at, len(scene.joints), there))
         if pin.at in seen:
             bound = f"clearance.pins[{seen[pin.at]}] is this pin already"
             yield draft.fault((*place, "at"), pin.at, bound, "Give every pin once.")
@@ -215,13 +210,13 @@ def names_of(index: int, joint: Joint) -> list[str]:
     return [f"cylinder_{number}.{place}" for place in PLACES["cylinder"]] + [f"joint_{number}.{place}" for place in own]
 
 
-def _unknown(at: str, joints: tuple[Joint | None, ...], there: list[str]) -> tuple[str, str]:
+def _unknown(at: str, joints: int, there: list[str]) -> tuple[str, str]:
     """Return why there is no such pin, and the names that exist."""
     form = re.fullmatch(r"(cylinder|joint)_(\d+)\.(\w+)", at)
     if form is None or form[3] not in PLACES[form[1]]:
         return "not the name of a pin", "Write cylinder_i. with rod or barrel, or joint_i. with pivot, link_L, link_R or Q."
     number = int(form[2])
-    if not 1 <= number <= len(joints):
-        return f"the boom has joints and cylinders 1 to {len(joints)}", f"Give one of {', '.join(there)}."
+    if not 1 <= number <= joints:
+        return f"the boom has joints and cylinders 1 to {joints}", f"Give one of {', '.join(there)}."
     own = [name for name in there if name.split(".")[0] in (f"joint_{number}", f"cylinder_{number}")]
     return f"joint {number} is of kind A and has no links", f"Give one of {', '.join(own)}."

@@ -1,16 +1,29 @@
 """The virtual rig: an independent model of the boom in Exudyn, its sensors and its sessions.
 
 Nothing here is part of the twin, and nothing of the twin's equations is used here. Scene parameters are surrogates and
-every session is synthetic. Needs the extra ``peers``.
+every session is synthetic. Needs the extra ``peers``: Exudyn is imported here alone.
 """
 
 from __future__ import annotations
 
-from .exudyn.solve import at_rest, move, simulate, statics
-from .exudyn.stepping import Effort, Scheme
+from importlib import import_module
+from typing import Any
+
+from ...errors import BoomTwinError
+
+try:
+    exudyn: Any = import_module("exudyn")
+    items: Any = import_module("exudyn.itemInterface")
+except ImportError as missing:
+    raise BoomTwinError(
+        "boom_twin.validation.rig needs the package exudyn, which is not installed (the twin itself does without it). "
+        'Remedy: pip install "boom_twin[peers]"'
+    ) from missing
+
 from .motion import BUNDLED_DURATION, Move, Programme, bundled, random_programme, through_postures
-from .sensors import Sensors, noise_free
-from .session import RigSession, observe, record
+from .session import RigSession, Sensors, observe, record
+from .solve import at_rest, move, simulate, statics
+from .stepping import Effort, Scheme
 
 __all__ = [
     "BUNDLED_DURATION",
@@ -23,7 +36,6 @@ __all__ = [
     "at_rest",
     "bundled",
     "move",
-    "noise_free",
     "observe",
     "random_programme",
     "record",

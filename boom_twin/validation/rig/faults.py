@@ -1,10 +1,10 @@
-"""Faults of the virtual rig: how they are written, and what those of sensors do to readings.
+"""Faults of the virtual rig: how they are written, the booms that have them, and what those of sensors do to readings.
 
 `listing` names every cause with its kinds and what their sizes are, in SI units. Those of stiffnesses, loads and clearance
-are physical: they are in the boom that is simulated, see `faulty_boom`. One of a drive is in the motion that the boom follows,
-and what has leaked by its end stays. The others are of sensors, and act on readings that are rounded already, as a fault
-behind the sensor does. Each begins at its onset, grows linearly to its size over its ramp, and goes over as long a time from
-its end on; a pin has its play from the start.
+are physical: they are in the boom that is simulated (`changes`), whose parameters may be wrong at random, too (`wrong_by`). One
+of a drive is in the motion that the boom follows, and what has leaked by its end stays. The others are of sensors, and act on
+readings that are rounded already, as a fault behind the sensor does. Each begins at its onset, grows linearly to its size over
+its ramp, and goes over as long a time from its end on; a pin has its play from the start.
 """
 
 from __future__ import annotations
@@ -13,16 +13,17 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...errors import UsageError
-from ...scene.edit import parameter
-from ...scene.schema import Scene
+from ...scene.edit import parameter, parameter_names, scaled, with_parameters
+from ...scene.schema import Clearance, CylinderPart, Joint, Pin, Scene
 from ...types import SECOND, Array
-from .exudyn.solve import Drive
 from .session import RigSession
+from .solve import Change, Drive
 
 _ANY, _MORE, _FACTOR = "finite and not 0", "above 0", "above 1"
 _SHARE, _LOSS, _PLAY = "above 0 and at most 1, a share", "above 0 and below 1, a share", "above 0 and below 0.005 m"
@@ -173,20 +174,14 @@ def check(faults: Sequence[RigFault], scene: Scene, duration: float) -> None:
     for fault in faults:
         if fault.is_physical and not fault.is_constant and changing.count(fault.cause) > 1:
             raise UsageError(f"fault {fault}: {fault.cause} changes by another fault too. Give one of them.")
-    for fault in faults:
         if fault.number > parts:
             raise UsageError(f"fault {fault}: the boom has joints, cylinders and sections 1 to {parts}. Give one of them.")
         if fault.onset >= duration:
             raise UsageError(f"fault {fault}: begins at {fault.onset:g} s, must be before the end at {duration:g} s.")
         most = largest_size(fault, scene, duration)
         if abs(fault.size) > most:
-            raise UsageError(
-                f"fault {fault}: size = {fault.size:g}, must be at most {most:.4g} on this boom. Give it in SI units."
-            )
-
-
-_MOST = {"late": 10.0, "noisy": 1000.0, "scale": 1.0}  # largest sizes that are the same for all booms; a delay in s
-MOST_ANGLE, MOST_FORCE = 1.0, 1e6  # rad, N; bias, spikes, and drift in a second
+            most_here = f"must be at most {most:.4g} on this boom"
+            raise UsageError(f"fault {fault}: size = {fault.size:g}, {most_here}. Give it in SI units.")
 
 
 def largest_size(fault: RigFault, scene: Scene, duration: float) -> float:
@@ -203,9 +198,9 @@ def largest_size(fault: RigFault, scene: Scene, duration: float) -> float:
         return parameter(scene, fault.cause)
     if fault.kind in ("bias", "spikes", "drift"):
         if fault.cause.startswith("joint_"):
-            return MOST_ANGLE
-        return MOST_FORCE if "force" in fault.cause else scene.joints[fault.number - 1].cylinder.max_stroke
-    return _MOST.get(fault.kind, math.inf)
+            return 1.0  # rad
+        return 1e6 if "force" in fault.cause else scene.joints[fault.number - 1].cylinder.max_stroke
+    return {"late": 10.0, "noisy": 1000.0, "scale": 1.0}.get(fault.kind, math.inf)
 
 
 def listing() -> list[str]:
@@ -217,6 +212,75 @@ def listing() -> list[str]:
             unit = _SIZES.get(kind) or _SIZES[f"{kind} {cause}"]
             lines.append(f"{cause:41} {kind:9} {unit}{f'; {bound}' if bound else ''}")
     return [*lines, "", f"I is 1, 2, ..; (a|b) is a or b. Write --fault {FORM}, times in s."]
+
+
+def changes(scene: Scene, faults: Sequence[RigFault]) -> tuple[Scene, list[Change]]:
+    """Return `scene` with the physical `faults` that are there at first, and its changes by those that come or go."""
+    first = [fault for fault in faults if fault.is_there_at_first]
+    start, found = with_faults(scene, first), list[Change]()
+    for fault in faults:
+        if not fault.is_physical or fault.is_constant:
+            continue
+        if fault.is_there_at_first:
+            found.append((with_faults(scene, [other for other in first if other is not fault]), partial(_gone, fault)))
+        else:
+            found.append((with_faults(scene, [*first, fault]), fault.share))
+    return start, found
+
+
+def _gone(fault: RigFault, times: Array) -> Array:
+    return np.asarray(1.0 - fault.share(times))
+
+
+def with_faults(scene: Scene, faults: Sequence[RigFault]) -> Scene:
+    """Return `scene` with the physical ones of `faults` in full; UsageError if it lacks the parameter of one.
+
+    A pin that the scene does not list gets a journal of 25 mm radius.
+    """
+    for fault in faults:
+        if fault.kind == "play":
+            scene = _worn(scene, fault.cause.removesuffix(".clearance"), fault.size)
+        elif fault.is_physical:
+            now = parameter(scene, fault.cause)
+            changed = {"more": now + fault.size, "less": now - fault.size, "softer": now * (1.0 - fault.size)}
+            scene = with_parameters(scene, {fault.cause: changed[fault.kind]})
+    return scene
+
+
+def _worn(scene: Scene, at: str, more: float) -> Scene:
+    clearance = scene.clearance or Clearance()
+    pins = {pin.at: pin for pin in clearance.pins}
+    pin = pins.get(at) or Pin(at=at, pin_radius=0.025, radial_clearance=0.0)
+    pins[at] = pin.model_copy(update={"radial_clearance": pin.radial_clearance + more})
+    return scene.model_copy(update={"clearance": clearance.model_copy(update={"pins": tuple(pins.values())})})
+
+
+def wrong_by(scene: Scene, share: float, seed: int) -> Scene:
+    """Return `scene` with every k, d, EI and mass of section, link, barrel and rod multiplied by 1 + `share` z of its own.
+
+    z is standard normal, drawn again beyond 2; masses take their inertia with them. Payload, line fill, geometry and material
+    damping stay, for they are known, or nothing is predicted from them that a sensor could tell.
+    """
+    if not 0.0 <= share <= 0.3:  # twice as much is drawn at most, and every parameter stays positive
+        raise UsageError(f"wrong by {share:g}: must be from 0 to 0.3, as a share of every parameter. 0.02 is 2 %.")
+    rng = np.random.default_rng([seed, 2])
+    names = [name for name in parameter_names(scene) if name.split(".")[-1] in ("k", "d", "EI", "mass")]
+    scene = with_parameters(scene, {name: parameter(scene, name) * _factor(share, rng) for name in names})
+    return scene.model_copy(update={"joints": tuple(_joint(joint, share, rng) for joint in scene.joints)})
+
+
+def _factor(share: float, rng: np.random.Generator) -> float:
+    while abs(z := rng.standard_normal()) > 2.0:
+        pass
+    return 1.0 + share * float(z)
+
+
+def _joint(joint: Joint, share: float, rng: np.random.Generator) -> Joint:
+    links = {key: getattr(joint, key) for key in ("mL", "mR")}
+    parts: dict[str, CylinderPart | None] = {key: getattr(joint.cylinder, key) for key in ("barrel", "rod")}
+    cylinder = {key: scaled(part, _factor(share, rng)) for key, part in parts.items() if part is not None}
+    changes = {key: mass * _factor(share, rng) for key, mass in links.items() if mass is not None}
+    return joint.model_copy(update={**changes, "cylinder": joint.cylinder.model_copy(update=cylinder)})
 
 
 def drifting(programme: Drive, faults: Sequence[RigFault]) -> Drive:
@@ -251,7 +315,7 @@ def _with_one(session: RigSession, fault: RigFault, rng: np.random.Generator) ->
     if fault.kind == "late":
         late = np.rint(share * round(fault.size * SECOND)).astype(np.int64)
         return replace(session, angle_stamps=session.angle_stamps + late)
-    name = _readings(fault.cause)
+    name = "forces" if "force" in fault.cause else "joints" if fault.cause.startswith("joint") else "strokes"
     values: Array = getattr(session, name).copy()
     if fault.kind == "missing":
         values[rng.random(len(share)) < share * fault.size] = np.nan
@@ -261,13 +325,6 @@ def _with_one(session: RigSession, fault: RigFault, rng: np.random.Generator) ->
         values[there, column] = _spoiled(fault, session.truth["t"], values[:, column], true, share, rng)[there]
     changed: dict[str, Any] = {name: values}
     return replace(session, **changed)
-
-
-def _readings(cause: str) -> str:
-    """Return the name of the session's readings that a fault of a sensor is in; their truth has the same name."""
-    if cause.startswith("cylinder_force"):
-        return "forces"
-    return "joints" if cause.startswith("joint") else "strokes"
 
 
 def _spoiled(fault: RigFault, times: Array, read: Array, true: Array, share: Array, rng: np.random.Generator) -> Array:

@@ -24,7 +24,7 @@ from ...errors import UsageError
 from ...scene.pump_pulses import CHANGE_OVER, ease, pump_pulses, upward
 from ...scene.schema import Scene
 from ...types import Array
-from .exudyn.solve import TipLoad
+from .solve import TipLoad
 
 FORM = "pump:FREQUENCY:HEIGHT[:CHANGE_OVER][@ONSET] or wind:DEVIATION[:TIME_SCALE][@ONSET]"
 COARSE = 0.02  # s between points of the wind, splined; it has no part above 25 Hz

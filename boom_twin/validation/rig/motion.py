@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +15,7 @@ from ...scene.load import load_scene
 from ...scene.pump_pulses import ease
 from ...scene.schema import Scene
 from ...types import Array
-from .exudyn.system import section_frames
+from .system import section_frames
 
 
 def ease_rate(x: Array) -> Array:
@@ -99,7 +99,6 @@ BUNDLED_MOVES = (
 
 TIP_SPEED = 1.2  # m/s, bound of random programmes, by rigid kinematics
 RANGE_SAMPLES = 91  # of a joint's range
-MARGIN = 0.08  # of the range of a stroke, kept free at both ends
 HOLD, DURATION = (3.0, 8.0), (1.5, 6.0)  # s
 FIRST_HOLD = 3.0  # s
 
@@ -107,8 +106,7 @@ FIRST_HOLD = 3.0  # s
 def bundled(scene: Scene) -> Programme:
     """Return the programme of the bundled session, 60 s that end in a hold: from posture arch, or else the scene's first.
 
-    A boom with other joints than the default scene's makes moves of the same shares of its cylinders' ranges, as far as they
-    have room; they are smaller where the tip would be faster than `TIP_SPEED`. UsageError if the scene has no posture.
+    A boom with other joints than the default scene's makes random moves. UsageError if the scene has no posture.
     """
     usual = load_scene()
     if not scene.postures:
@@ -117,29 +115,7 @@ def bundled(scene: Scene) -> Programme:
     first = strokes_of_posture(scene, posture)
     if scene.joints == usual.joints and scene.base == usual.base and scene.postures[posture] == usual.postures["arch"]:
         return Programme(tuple(first.tolist()), BUNDLED_MOVES)
-    return _scaled(scene, first, usual)
-
-
-def _scaled(scene: Scene, first: Array, usual: Scene) -> Programme:
-    """Return the bundled moves as shares of the ranges of other cylinders, from `first` (m)."""
-    at = strokes_of_posture(usual, "arch")
-    wide = [high - low for low, high in (stroke_range(usual, i, RANGE_SAMPLES) for i in range(len(at)))]
-    moves = []
-    for i, start in enumerate(first.tolist()):
-        low, high = stroke_range(scene, i, RANGE_SAMPLES)
-        free, model = MARGIN * (high - low), i % len(at)
-        for move in (move for move in BUNDLED_MOVES if move.cylinder == model):
-            target = start + (high - low) * (move.target - float(at[model])) / wide[model]
-            low_end, high_end = min(start, low + free), max(start, high - free)
-            moves.append(replace(move, cylinder=i, target=min(max(target, low_end), high_end)))
-    times = np.linspace(0.0, BUNDLED_DURATION, 401)
-    while True:
-        programme = Programme(tuple(first.tolist()), tuple(moves))
-        fastest = float(tip_speed(scene, programme, times).max())
-        if fastest <= TIP_SPEED:
-            return programme
-        share = 0.95 * TIP_SPEED / fastest
-        moves = [replace(move, target=float(first[move.cylinder] * (1.0 - share) + share * move.target)) for move in moves]
+    return random_programme(scene, posture, BUNDLED_DURATION, 0)
 
 
 def random_programme(scene: Scene, posture: str, duration: float, seed: int) -> Programme:
@@ -208,7 +184,7 @@ def _reachable(scene: Scene, now: Array, cylinders: list[int], span: float, rng:
         low, high = stroke_range(scene, i, RANGE_SAMPLES)
         if low >= high:
             raise UsageError(f"cylinder_{i + 1}: no stroke is within both max_stroke and range_deg. Widen one.")
-        free = MARGIN * (high - low)
+        free = 0.08 * (high - low)  # kept free at both ends
         aim[i] = rng.uniform(low + free, high - free)
     while True:
         trial = Programme(tuple(now.tolist()), tuple(Move(i, 0.0, span, float(aim[i])) for i in cylinders))

@@ -1,11 +1,13 @@
-"""Record a synthetic session of the virtual rig.
+"""Sensor model of the virtual rig (noise, resolution, jitter), and synthetic sessions recorded by it.
 
-Synthetic by construction: the scene's parameters are surrogates, and no hardware took part.
+Synthetic by construction: parameters of scene and sensors are surrogates, and no hardware took part. The instant of sampling
+is the stamp itself.
 """
 
 from __future__ import annotations
 
 import gzip
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -15,17 +17,76 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from ...errors import UsageError
 from ...scene.kinematics import gravity_in_base
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
 from ...types import NO_PLACES, SECOND, Array, Place, Stream
-from .exudyn.solve import SITE, Change, Drive, TipLoad, simulate
-from .exudyn.system import Site
-from .sensors import Sensors, read, sampling_stamps, specific_force
+from .solve import Change, Drive, TipLoad, simulate
+from .system import Site
 
 EPOCH = 1_700_000_000 * SECOND  # stamp (ns) of the start of every session
 POINT_PERIOD = 1.0  # s, of a total station
 BACK_PRESSURE = 1e6  # Pa
+
+
+RATE = 200.0  # Hz
+RATES = 50.0, 1000.0  # Hz: jitter reaches half the time between two samples at 2500 Hz, and a motion is recorded at 1000 Hz
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """Sampling and noise: Hz, s, m, rad, m/s^2, rad/s, N, N m, Pa; a resolution of zero means no rounding.
+
+    Standard deviations are those before rounding. Forces are as of load pins, or of pressures in both chambers: 100 N is a
+    thousandth of what the largest cylinder of the default scene bears. UsageError unless the rate is within `RATES`.
+    """
+
+    rate: float = RATE
+    jitter: float = 2e-4
+    stroke_sigma: float = 2e-5
+    stroke_resolution: float = 5e-6
+    angle_sigma: float = math.radians(0.01)
+    angle_resolution: float = math.radians(0.005)
+    imu_sigma: float = 0.05
+    rate_sigma: float = 2e-3
+    force_sigma: float = 100.0
+    force_resolution: float = 20.0
+    moment_sigma: float = 50.0
+    point_sigma: float = 2e-3
+    pressure_sigma: float = 1e4
+
+    def __post_init__(self) -> None:
+        low, high = RATES
+        if not low <= self.rate <= high:
+            raise UsageError(f"rate = {self.rate:g}, must be from {low:g} to {high:g} Hz, at which the sensors are sampled.")
+
+
+def sampling_stamps(sensors: Sensors, duration: float, start: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Draw stamps (ns, int64) within `duration` (s) after `start` (ns), uniformly jittered about the grid.
+
+    The grid begins half a period after the start, so that no jitter reaches beyond either end.
+    """
+    count = round(duration * sensors.rate)
+    instants = (np.arange(count) + 0.5) / sensors.rate + rng.uniform(-sensors.jitter, sensors.jitter, count)
+    return start + np.rint(instants * SECOND).astype(np.int64)
+
+
+def read(true: Array, sigma: float, resolution: float, rng: np.random.Generator) -> Array:
+    """Return values with normal noise of `sigma`, rounded to `resolution`; all in one unit, any shape."""
+    noisy = true + sigma * rng.standard_normal(true.shape)
+    return noisy if resolution == 0.0 else np.asarray(np.rint(noisy / resolution) * resolution)
+
+
+def specific_force(acceleration: Array, angle: Array, gravity: Array) -> Array:
+    """Return the reading of an ideal accelerometer: acceleration minus gravity in its own axes, (m, 2) m/s^2.
+
+    `acceleration` (m, 2), without gravity, and `gravity` (2,) are in the base's axes, `angle` (m,) is that of the x axis
+    there, rad.
+    """
+    fx, fy = acceleration[:, 0] - gravity[0], acceleration[:, 1] - gravity[1]
+    c, s = np.cos(angle), np.sin(angle)
+    return np.column_stack([c * fx + s * fy, -s * fx + c * fy])
 
 
 @dataclass(frozen=True)
@@ -69,19 +130,6 @@ class RigSession:
         ]
 
 
-def motion_columns(rows: dict[str, Array]) -> dict[str, Array]:
-    """Stack the columns of a simulation into the arrays of a session's truth, without its drives."""
-    number = range(1, 1 + sum(name.startswith("stroke_") for name in rows))
-    return {
-        "tip": np.column_stack([rows["tip_x_m"], rows["tip_y_m"]]),
-        "tip_acc": np.column_stack([rows["tip_ax_m_s2"], rows["tip_ay_m_s2"]]),
-        "tip_angle": rows["tip_angle_rad"],
-        "strokes": np.column_stack([rows[f"length_{i}_m"] for i in number]),
-        "joints": np.column_stack([rows[f"joint_{i}_rad"] for i in number]),
-        "forces": np.column_stack([rows[f"cylinder_force_{i}_N"] for i in number]),
-    }
-
-
 def observe(
     scene: Scene,
     drive: Drive,
@@ -98,31 +146,32 @@ def observe(
     `POINT_PERIOD`. `cylinders` are bore and rod (m) of all whose pressures are measured.
     """
     clock, stroke_noise, angle_noise, imu_noise, force_noise, *others = np.random.default_rng(seed).spawn(7 + len(places))
-    stamps = sampling_stamps(sensors, float(rows["t_s"][-1]), EPOCH, clock)
+    stamps = sampling_stamps(sensors, float(rows["t"][-1]), EPOCH, clock)
     times = (stamps - EPOCH) / SECOND
 
     def at(values: Array) -> Array:
-        return np.asarray(CubicSpline(rows["t_s"], values)(times))
+        return np.asarray(CubicSpline(rows["t"], values)(times))
 
-    truth = {name: at(values) for name, values in motion_columns(rows).items()}
-    truth |= {"t": times, "drives": drive(times)[0]} | ({} if load is None else {"load": load(times)})
+    truth = {name: at(rows[name]) for name in ("tip", "tip_acc", "tip_angle", "joints", "forces")}
+    truth |= {"t": times, "strokes": at(rows["lengths"]), "drives": drive(times)[0]}
+    if load is not None:
+        truth["load"] = load(times)
     force = specific_force(truth["tip_acc"], truth["tip_angle"], gravity_in_base(scene))
-    placed = {Stream.RATE: read(at(rows["tip_angular_velocity_rad_s"])[:, None], sensors.rate_sigma, 0.0, others[0])}
-    for k, ((name, place), noise) in enumerate(zip(places.items(), others[1:-1], strict=True), start=1):
-        columns = {end: at(rows[f"site_{k}_{end}"]) for end in SITE if np.isfinite(rows[f"site_{k}_{end}"]).all()}
+    placed = {Stream.RATE: read(at(rows["tip_rate"])[:, None], sensors.rate_sigma, 0.0, others[0])}
+    for k, ((name, place), noise) in enumerate(zip(places.items(), others[1:-1], strict=True)):
+        site = rows["sites"][:, k]  # x, y, their accelerations, angle, its rate, bending moment
         if name.startswith("moment_"):
             of_all = placed.setdefault(Stream.MOMENTS, np.full(truth["joints"].shape, np.nan))
-            of_all[:, int(name.removeprefix("moment_")) - 1] = read(columns["moment_Nm"], sensors.moment_sigma, 0.0, noise)
+            of_all[:, int(name.removeprefix("moment_")) - 1] = read(at(site[:, 6]), sensors.moment_sigma, 0.0, noise)
         elif name.startswith("points"):
-            position = np.column_stack([columns["x_m"], columns["y_m"]])
+            position = at(site[:, :2])
             placed[Stream(name)] = np.full(position.shape, np.nan)
             seen = np.unique(np.floor(times / POINT_PERIOD), return_index=True)[1]
             placed[Stream(name)][seen] = read(position[seen], sensors.point_sigma, 0.0, noise)
         else:
-            accelerations = np.column_stack([columns["ax_m_s2"], columns["ay_m_s2"]])
-            felt = specific_force(accelerations, columns["angle_rad"] + place.turned, gravity_in_base(scene))
+            felt = specific_force(at(site[:, 2:4]), at(site[:, 4]) + place.turned, gravity_in_base(scene))
             placed[Stream(name)] = read(felt, sensors.imu_sigma, 0.0, noise)
-            placed[Stream(f"{name}_rate")] = read(columns["rate_rad_s"][:, None], sensors.rate_sigma, 0.0, noise)
+            placed[Stream(f"{name}_rate")] = read(at(site[:, 5:6]), sensors.rate_sigma, 0.0, noise)
     if cylinders:
         pressures = _pressures(truth["forces"], cylinders)
         placed[Stream.PRESSURES] = read(pressures, sensors.pressure_sigma, 0.0, others[-1])

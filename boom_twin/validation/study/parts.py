@@ -2,168 +2,107 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...analysis.motions import DURATION
+from ...analysis.methods import DURATION
 from ...errors import SolverError
-from ...plots.study import Bars, parts_picture
-from ...reduction.deviation import (
-    FREQUENCIES,
-    Deviation,
-    Response,
-    StrokeCourse,
-    answer,
-    course_of,
-    deviation,
-    step_times,
-    unknowns,
-)
-from ...reduction.variants import Variant, variants
+from ...reduction.deviation import FREQUENCIES, Response, StrokeCourse, answer, course_of, deviation, step_times, unknowns
+from ...reduction.search import Variant, variants
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
-from ...types import Array
 from .report import page, table, write_json
 
-ROUNDS, QUICK_ROUNDS = 30, 5
-QUICK_DURATION = 2.0  # s
 HEAD = ("variant", "at rest, mm", "moving, mm", "f1, %", "time saved, %")
 
 
-@dataclass(frozen=True)
-class VariantCost:
-    """One variant, its deviation from the full model, and its cost."""
-
-    variant: Variant
-    deviation: Deviation
-    shifts: Array  # (`FREQUENCIES`,), relative, of natural frequencies at the start of the move; NaN if a model lacks one
-    step_time: float  # s; NaN where the move fails
-    unknowns: int
-    status: str  # "ok", or why there are no numbers
-
-
-@dataclass(frozen=True)
-class PartsStudy:
-    """A study. `full_times`: a step of the full model, measured twice, s; `parts` ascend in the error of the tip."""
-
-    course: StrokeCourse
-    frequencies: Array
-    full_times: tuple[float, float]
-    unknowns: int
-    parts: tuple[VariantCost, ...]
-
-    def saved(self, part: VariantCost) -> float:
-        """Return the share of the full model's run time that leaving the part out saves; negative where it costs."""
-        return 1.0 - part.step_time / self.full_times[0]
-
-    @property
-    def shown(self) -> tuple[VariantCost, ...]:
-        """Return the variants of the page: no other numbers of shapes in one section of several; the JSON has them."""
-        several = len(self.course.motion.first) > 1
-        return tuple(p for p in self.parts if not (several and p.variant.kind == "modes" and len(p.variant.edits) == 1))
-
-
-def measure(scene: Scene, course: StrokeCourse, rounds: int = ROUNDS) -> PartsStudy:
-    """Compare every variant of a scene with the scene itself; times are the least of `rounds`.
-
-    SolverError if the scene itself has no equilibrium or fails in the move; a variant that does has a status.
-    """
-    found = variants(scene)
-    full = answer(scene, course, FREQUENCIES)
-    if full.status != "ok":
-        raise SolverError(f"the scene itself fails: {full.status}")
-    answers = [answer(variant.of(scene), course, FREQUENCIES) for variant in found]
-    able = [k for k, one in enumerate(answers) if one.status == "ok"]
-    times = np.full(len(found), np.nan)
-    least = step_times([scene, *(found[k].of(scene) for k in able), scene], course, rounds)
-    times[able] = least[1:-1]
-    parts = [_part(scene, *row, full, course) for row in zip(found, answers, times.tolist(), strict=True)]
-    parts.sort(key=lambda part: (part.deviation.worst, part.variant.name))
-    return PartsStudy(course, full.frequencies, (float(least[0]), float(least[-1])), unknowns(scene), tuple(parts))
-
-
-def _part(scene: Scene, variant: Variant, found: Response, time: float, full: Response, course: StrokeCourse) -> VariantCost:
-    shifts = np.full(FREQUENCIES, np.nan)
-    both = min(len(found.frequencies), len(full.frequencies))
-    shifts[:both] = found.frequencies[:both] / full.frequencies[:both] - 1.0
-    return VariantCost(variant, deviation(found, full, course), shifts, time, unknowns(variant.of(scene)), found.status)
-
-
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
-    """Measure in a move from `posture`; write parts.json, parts.md and parts.png into the folder `out`; return their paths."""
-    course = course_of(scene, posture, QUICK_DURATION if quick else DURATION)
-    found = measure(scene, course, QUICK_ROUNDS if quick else ROUNDS)
-    paths = [out / f"parts.{kind}" for kind in ("json", "md", "png")]
-    write_json(paths[0], as_json(found))
-    write_atomic(paths[1], as_markdown(found))
-    parts_picture(paths[2], bars(found), "surrogate parameters; one motion, another may differ")
+    """Measure in a move from `posture`; write parts.json and parts.md into the folder `out`; return their paths."""
+    course = course_of(scene, posture, 2.0 if quick else DURATION)
+    found = measure(scene, course, 5 if quick else 30)
+    paths = [out / f"parts.{kind}" for kind in ("json", "md")]
+    write_json(paths[0], found)
+    write_atomic(paths[1], as_markdown(found, several=len(scene.sections) > 1))
     return paths
 
 
-def as_json(found: PartsStudy) -> dict[str, Any]:
-    """Return all numbers, SI units, shares as fractions."""
+def measure(scene: Scene, course: StrokeCourse, rounds: int) -> dict[str, Any]:
+    """Compare every variant of a scene with the scene itself; times are the least of `rounds`. SI units, shares as fractions.
+
+    ``full`` is of the scene itself, its step timed before and after all others. ``variants`` ascend in the error of the tip.
+    SolverError if the scene itself has no equilibrium or fails in the move; a variant that does has a status.
+    """
+    full = answer(scene, course, FREQUENCIES)
+    if full.status != "ok":
+        raise SolverError(f"the scene itself fails: {full.status}")
+    found = variants(scene)
+    scenes = [variant.of(scene) for variant in found]
+    answers = [answer(each, course, FREQUENCIES) for each in scenes]
+    able = [k for k, one in enumerate(answers) if one.status == "ok"]
+    first, *least, last = step_times([scene, *(scenes[k] for k in able), scene], course, rounds).tolist()
+    times = dict(zip(able, least, strict=True))
+    rows = [
+        _deviation(variant, response, full, course)
+        | {"step_time_s": times.get(k, np.nan), "time_saved": 1.0 - times.get(k, np.nan) / first}
+        | {"unknowns": unknowns(scenes[k]), "status": response.status}
+        for k, (variant, response) in enumerate(zip(found, answers, strict=True))
+    ]
+    rows.sort(key=lambda row: (max(row["rest_error_m"], row["move_error_max_m"]), row["name"]))
     return {
-        "at_rest_in": found.course.names,
-        "move": found.course.motion.label,
-        "step_s": found.course.step,
-        "full": {"frequencies_Hz": found.frequencies, "step_times_s": found.full_times, "unknowns": found.unknowns},
-        "variants": [
-            {
-                "name": part.variant.name,
-                "kind": part.variant.kind,
-                "edits": "; ".join(map(str, part.variant.edits)),
-                "rest_error_m": part.deviation.rest,
-                "rest_error_at": part.deviation.where,
-                "move_error_rms_m": part.deviation.rms,
-                "move_error_max_m": part.deviation.most,
-                **{f"f{k + 1}_shift": shift for k, shift in enumerate(part.shifts)},
-                "step_time_s": part.step_time,
-                "time_saved": found.saved(part),
-                "unknowns": part.unknowns,
-                "status": part.status,
-            }
-            for part in found.parts
-        ],
+        "at_rest_in": course.names,
+        "move": course.motion.label,
+        "step_s": course.step,
+        "full": {"frequencies_Hz": full.frequencies, "step_times_s": (first, last), "unknowns": unknowns(scene)},
+        "variants": rows,
     }
 
 
-def as_markdown(found: PartsStudy) -> str:
-    """Return the report: how it was measured, and one table, ascending in the error of the tip."""
-    first, second = (1e6 * time for time in found.full_times)
+def _deviation(variant: Variant, found: Response, full: Response, course: StrokeCourse) -> dict[str, Any]:
+    """Return a variant and its deviation; shifts of natural frequencies are relative, and NaN if a model lacks one."""
+    off, shifts = deviation(found, full, course), np.full(FREQUENCIES, np.nan)
+    both = min(len(found.frequencies), len(full.frequencies))
+    shifts[:both] = found.frequencies[:both] / full.frequencies[:both] - 1.0
+    return {
+        "name": variant.name,
+        "kind": variant.kind,
+        "edits": "; ".join(map(str, variant.edits)),
+        "rest_error_m": off.rest,
+        "rest_error_at": off.where,
+        "move_error_rms_m": off.rms,
+        "move_error_max_m": off.most,
+        **{f"f{k}_shift": shift for k, shift in enumerate(shifts.tolist(), start=1)},
+    }
+
+
+def as_markdown(found: Mapping[str, Any], several: bool) -> str:
+    """Return the report: how it was measured, and one table, ascending in the error of the tip.
+
+    On a boom of `several` sections, other numbers of shapes in one of them are not shown; the JSON has them.
+    """
+    full = found["full"]
+    first, second = (1e6 * time for time in full["step_times_s"])
+    shown = [row for row in found["variants"] if not (several and row["kind"] == "modes" and ";" not in row["edits"])]
     parts = [
         "# What the parts of a model cost, and what leaving them out changes",
-        "![What leaving a part out changes, and what it saves](parts.png)",
-        f"Each row compares an edited scene with the full scene ({found.unknowns} unknowns). A step of the full scene took "
+        f"Each row compares an edited scene with the full scene ({full['unknowns']} unknowns). A step of the full scene took "
         f"{first:.2f} us, and {second:.2f} us at the end. Smaller differences are noise.",
-        f"- At rest: largest distance between the tips. States: {', '.join(found.course.names)}.\n"
-        f"- Moving: the same in a move with steps of {1e3 * found.course.step:g} ms. Move: {found.course.motion.label}.\n"
-        f"- f1: change of the first natural frequency ({found.frequencies[0]:.3f} Hz).\n"
+        f"- At rest: largest distance between the tips. States: {', '.join(found['at_rest_in'])}.\n"
+        f"- Moving: the same in a move with steps of {1e3 * found['step_s']:g} ms. Move: {found['move']}.\n"
+        f"- f1: change of the first natural frequency ({full['frequencies_Hz'][0]:.3f} Hz).\n"
         "- Time saved: stepping alone, minimum of interleaved runs. Negative means slower.",
         "Leave out parts whose error you accept, if that saves time. `boom_twin check --need` makes the reduced scene. "
         "`parts.json` adds the edits, other frequencies, and single sections with other mode numbers.",
-        table(HEAD, [_row(found, part) for part in found.shown]),
+        table(HEAD, map(_row, shown)),
         "Limits: another motion may differ. Leaving out several parts may cause larger errors.",
     ]
     return page(parts)
 
 
-def _row(found: PartsStudy, part: VariantCost) -> Sequence[object]:
-    if part.status != "ok":
-        return [f"{part.variant.name}: {part.status}", *[None] * (len(HEAD) - 1)]
-    off = part.deviation
-    return [part.variant.name, 1e3 * off.rest, 1e3 * off.most, 100.0 * float(part.shifts[0]), 100.0 * found.saved(part)]
-
-
-def bars(found: PartsStudy) -> Bars:
-    """Return the bars of the picture."""
-    good = [part for part in found.shown if part.status == "ok"]
-    return Bars(
-        names=tuple(part.variant.name for part in good),
-        rest=np.array([part.deviation.rest for part in good]),
-        move=np.array([part.deviation.most for part in good]),
-        saved=np.array([found.saved(part) for part in good]),
-    )
+def _row(part: Mapping[str, Any]) -> list[object]:
+    if part["status"] != "ok":
+        return [f"{part['name']}: {part['status']}", *[None] * (len(HEAD) - 1)]
+    sizes = 1e3 * part["rest_error_m"], 1e3 * part["move_error_max_m"], 100.0 * part["f1_shift"], 100.0 * part["time_saved"]
+    return [part["name"], *sizes]

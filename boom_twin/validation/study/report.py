@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from ...system.atomic_files import write_atomic
-from ...system.cores import usable_cores
-from ...system.json_text import json_text
+from ...system.processes import usable_cores
+from ...system.result_text import json_text
 
 PACKAGES = ("numpy", "scipy", "numba", "exudyn", "boom_twin")
 

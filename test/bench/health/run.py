@@ -32,13 +32,12 @@ from bench.record import keep
 from default_boom import with_parameters
 
 from boom_twin import Twin, load_scene
-from boom_twin.bag.session_files import samples_of
+from boom_twin.bag.session_writer import samples_of
 from boom_twin.health.alarms import Alarms
-from boom_twin.twin.blocks import ReportBlock, block_of
+from boom_twin.twin.blocks import block_of
 from boom_twin.types import NANO, Stream
 from boom_twin.validation.rig import Scheme, Sensors, at_rest, move, observe, random_programme
-from boom_twin.validation.rig.faults import parse, spoil
-from boom_twin.validation.rig.faulty_boom import changes, wrong_by
+from boom_twin.validation.rig.faults import changes, parse, spoil, wrong_by
 from boom_twin.validation.rig.loads import PumpLoad, WindLoad, tip_load
 from boom_twin.validation.rig.motion import Programme
 
@@ -97,10 +96,8 @@ def row_of(number: int, causes: bool = False) -> dict[str, Any]:
     first = int(seen.stamps[0])
     rows = {Stream.STROKES: seen.strokes, Stream.ANGLES: seen.joints, Stream.IMU: imu, Stream.FORCES: forces}
     samples = samples_of(seen.stamps, {stream: each for stream, each in rows.items() if each is not None}, seen.angle_stamps)
-    for report in twin.update_block(block_of(samples, len(scene.joints))):
-        for health in report.health.values() if isinstance(report, ReportBlock) else [each.health for each in report.all]:
-            if health is not None:
-                alarms.take(health)
+    for health in twin.take(block_of(samples, len(scene.joints))).health.values():
+        alarms.take(health)
     found = []
     for each in alarms.all:
         since, until = (stamp and (stamp - first) * NANO for stamp in (each.since, each.until))

@@ -10,14 +10,13 @@ import numpy as np
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_samples
-from boom_twin.calibration.rest_periods import Rigging
-from boom_twin.calibration.sessions import read_sessions
-from boom_twin.calibration.validation import judged
+from boom_twin.bag.session_writer import write_samples
+from boom_twin.calibration.run import judged
+from boom_twin.calibration.sessions import Rigging, read_sessions
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
-from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
+from boom_twin.diagnostics.twin_status import TwinWatch
 from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
@@ -60,7 +59,7 @@ for sample in samples:
 assert {residuals.names for residuals in found} == {(CHANNEL,)} and len(found) == count
 values, ratios = (np.array([getattr(residuals, part)[0] for residuals in found]) for part in ("values", "normalised"))
 assert np.abs(values - WRONG).max() < 6e-4 and ratios.min() > 5.0
-looked = all_pieces(watch.look({}, "", {stream: Peers(name) for stream, name in names.items()}, (), now))
+looked = watch.look({}, "", {stream: Peers(name) for stream, name in names.items()}, (), now)
 statuses = {status.name: status.message for status in looked}
 assert statuses[f"sensor {CHANNEL}"] == "measuring"
 assert {"tip_inclination", "residual tip_inclination"} <= set(statuses)

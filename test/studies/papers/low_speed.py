@@ -13,7 +13,7 @@ import numpy as np
 from boom_twin import Scene, SolverError
 from boom_twin.analysis.drive import STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import settle
-from boom_twin.analysis.motions import Motion as StrokeMotion
+from boom_twin.analysis.methods import Motion as StrokeMotion
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.compiler.plan import Plan
@@ -73,10 +73,10 @@ def _solve(
             hat[heavy] = (position - _along(plan, state, work, state.z - hat[:unknowns]))[heavy]
         clear_cut(work, FREE)
         motion = Motion(*scheme, hat, offset)
-        status, _, _ = sweep_in(t, state, work, motion, *drive, ROOT, last, FREE, work.condensed)
+        status, _, _ = sweep_in(t, state, work, motion, *drive, ROOT, last, FREE)
         if status != OK:
             raise SolverError(f"a step fails: {SENTENCES[int(status)]}.")
-        sweep_out(t, state, work, work.condensed, ROOT, last, FREE)
+        sweep_out(t, state, work, ROOT, last, FREE)
         state.z[:] += work.dz
         place(t, state, work)
         if np.max(t.scale * np.abs(work.dz)) < STEP_TOLERANCE:

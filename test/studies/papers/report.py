@@ -10,13 +10,14 @@ import numpy as np
 from default_boom import motion_of, posture_angles, skeleton, strokes_of_posture
 from studies.clearance.scenes import ideal
 
-from boom_twin import Scene, simulate, statics, undeflected
+from boom_twin import Scene, simulate, statics
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.modal import natural_modes
 from boom_twin.compiler.compile import BasisName, compile_scene
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.validation.study.report import page, table
 
+from .let_go import undeflected
 from .low_speed import error_by_speed
 from .pictures import LetGoTrace, low_speed_picture
 
@@ -73,7 +74,7 @@ def _bases(scene: Scene, posture: str) -> BasisRow:
 def _let_go(scene: Scene, posture: str) -> tuple[LetGoTrace, ...]:
     """The boom held in a posture, and moved up from it, from the undeflected posture."""
     strokes, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
-    start, move = undeflected(scene, strokes, angles=angles), motion_of(scene, posture)
+    start, move = undeflected(scene, strokes, angles), motion_of(scene, posture)
     times = np.arange(0.0, HELD + 1e-9, 5e-3)
     height = float(skeleton(scene, angles).pivots[-1][1])
     found = []

@@ -79,8 +79,8 @@ def one_step(scene: Scene, angles: np.ndarray, step: float, rho: float) -> StepR
 def _riccati(plan: Plan, state: State, work: Work, motion: Motion, drive: np.ndarray) -> bool:
     clear_cut(work, FREE)
     last, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
-    status, _, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, last, FREE, work.condensed)
-    sweep_out(plan.tables, state, work, work.condensed, ROOT, last, FREE)
+    status, _, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, last, FREE)
+    sweep_out(plan.tables, state, work, ROOT, last, FREE)
     return bool(status == OK)
 
 

@@ -14,8 +14,7 @@ from default_boom import parameter, strokes_of_posture
 
 from boom_twin import Scene, UsageError, load_scene
 from boom_twin.validation.rig import Move, Programme, Sensors, record, simulate, statics
-from boom_twin.validation.rig.faults import parse
-from boom_twin.validation.rig.faulty_boom import changes, with_faults, wrong_by
+from boom_twin.validation.rig.faults import changes, parse, with_faults, wrong_by
 
 
 def ratios(changed: Scene, scene: Scene) -> dict[str, float]:
@@ -48,8 +47,8 @@ def test_changes_over_a_time_to_the_equilibrium_of_the_changed_boom_and_back(tex
     strokes = strokes_of_posture(scene, "arch")
     start, changing = changes(scene, [fault])
     rows = simulate(start, Programme(tuple(strokes), ()), 13.0, 5e-3, 5e-3, 4, changes=changing)
-    tip, times = np.column_stack([rows["tip_x_m"], rows["tip_y_m"]]), rows["t_s"]
-    healthy, faulty = (np.array(statics(boom, strokes, 4)["tip_m"]) for boom in (scene, with_faults(scene, [fault])))
+    tip, times = rows["tip"], rows["t"]
+    healthy, faulty = (statics(boom, strokes, 4)["tip"] for boom in (scene, with_faults(scene, [fault])))
     assert tip[0] == pytest.approx(healthy, abs=1e-8)
     moved = np.hypot(*(faulty - healthy))
     for first, last, expected in ((5.0, 7.0, faulty), (11.5, 13.0, healthy)):

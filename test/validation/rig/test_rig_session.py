@@ -11,9 +11,8 @@ import pytest
 pytest.importorskip("exudyn")
 
 from boom_twin import Scene
-from boom_twin.validation.rig import Move, Programme, noise_free, observe, simulate
-from boom_twin.validation.rig.sensors import Sensors, read, specific_force
-from boom_twin.validation.rig.session import EPOCH
+from boom_twin.validation.rig import Move, Programme, observe, simulate
+from boom_twin.validation.rig.session import EPOCH, Sensors, read, specific_force
 
 
 @pytest.mark.parametrize(("sigma", "resolution"), [(2e-5, 5e-6), (math.radians(0.01), math.radians(0.005))])
@@ -35,6 +34,7 @@ def test_imu_reads_gravity_upwards_and_outward_acceleration_along_x(angle):
     assert specific_force(outward, np.array([angle]), (0.0, 0.0))[0] == pytest.approx([1.0, 0.0], abs=1e-12)
 
 
+EXACT = Sensors(stroke_sigma=0.0, stroke_resolution=0.0)
 MOVE = Programme((0.5,), (Move(0, 0.2, 0.6, 0.56),))
 
 
@@ -47,7 +47,7 @@ def motion(one_rigid):
 def test_transducers_read_lengths_with_the_oil_compressed(motion):
     """The closed form of the slider crank, and the law of the oil spring and its damper."""
     scene, rows = motion
-    session = observe(scene, MOVE, rows, noise_free(), seed=1)
+    session = observe(scene, MOVE, rows, EXACT, seed=1)
     pin, rod = np.subtract(scene.base.cylinder_pin, scene.base.pivot), scene.sections[0].rod_pin
     cylinder, angle = scene.joints[0].cylinder, session.truth["joints"]
     x, y = rod[0] * np.cos(angle) - rod[1] * np.sin(angle) - pin[0], rod[0] * np.sin(angle) + rod[1] * np.cos(angle) - pin[1]

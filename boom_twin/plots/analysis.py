@@ -1,0 +1,189 @@
+"""Pictures of analyses of a scene: envelope, frequency response, steady state under a periodic load, resonance map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..analysis.envelope import Envelope
+from ..analysis.frequency_response import FrequencyResponse
+from ..analysis.steady_state import ResonanceMap, SteadyState
+from ..scene.kinematics import skeleton
+from ..scene.schema import Scene
+from ..types import Array, ComplexArray
+from .boom import draw_base
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, TONES, legend_above, picture, side_view
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.text import Annotation
+
+
+COLOURS = {"kN": ORANGE, "Hz": GREEN, "kN m": PURPLE, "MPa": SKY}  # colours of bars, by unit
+GAP = 16.0  # pixels between a bar, its words and the edge
+LEAST_BAR_WIDTH = 0.1  # of the width, that is left for bars however long the words are
+
+
+def envelope_picture(path: Path, scene: Scene, found: Envelope, ranges: list[tuple[str, Array]]) -> None:
+    """Write the picture; `ranges` are words with unit, as in ``frequency 1, Hz``, and the values (m,) in that unit."""
+    units = list(dict.fromkeys(words.rpartition(", ")[2] for words, _ in ranges))
+    note = f"{len(found.names)} postures at rest"
+    with picture(path, "Envelope over the working range", note, (18.0, 11.0)) as figure:
+        grid = figure.add_gridspec(len(units) or 1, 2, width_ratios=[1.35, 1.0])
+        _tips(figure.add_subplot(grid[:, 0]), scene, found)
+        bars = []
+        for row, unit in enumerate(units):
+            own = [(words.rpartition(", ")[0], values) for words, values in ranges if words.rpartition(", ")[2] == unit]
+            bars.append((axes := figure.add_subplot(grid[row, 1]), _bars(axes, found, own, unit)))
+        figure.draw_without_rendering()
+        for axes, labels in bars:
+            _make_room(axes, labels)
+
+
+def _tips(axes: Axes, scene: Scene, found: Envelope) -> None:
+    side_view(axes)
+    shown = axes.scatter(
+        found.tips[:, 0], found.tips[:, 1], c=1e3 * found.deflections, s=26, cmap="viridis_r", zorder=3, label="tips"
+    )
+    axes.figure.colorbar(shown, ax=axes, label="tip deflection, mm", shrink=0.6, location="bottom", pad=0.02)
+    worst = {"largest deflection": found.deflections.argmax()}
+    if found.frequencies.shape[1]:
+        worst["lowest frequency"] = found.frequencies[:, 0].argmin()
+    if np.isfinite(found.stresses).any():
+        worst["largest stress"] = np.nan_to_num(found.stresses).max(axis=1).argmax()
+    names: dict[int, list[str]] = {}
+    for name, row in worst.items():
+        names.setdefault(int(row), []).append(name)
+    for (place, of), colour in zip(names.items(), (INK, BLUE, ORANGE), strict=False):
+        bones = skeleton(scene, np.diff(np.radians(found.angles[place]), prepend=0.0))
+        label = f"{' and '.join(of)}: {found.posture(place)}"
+        axes.plot(*bones.pivots.T, "o-", color=colour, linewidth=2.2, markersize=5, label=label)
+    draw_base(axes, np.array(scene.base.pivot), 0.035 * scene.reach)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=11)
+
+
+def _bars(axes: Axes, found: Envelope, own: list[tuple[str, Array]], unit: str) -> list[Annotation]:
+    """Draw one bar for each quantity from its least to its greatest value; the ends are labelled with value and posture."""
+    labels = []
+    for place, (_, values) in enumerate(own):
+        low, high = int(values.argmin()), int(values.argmax())
+        axes.barh(place, values[high] - values[low], left=values[low], height=0.5, color=COLOURS.get(unit, GREY), alpha=0.8)
+        for row, side in ((low, "right"), (high, "left")):
+            gap = -4 if side == "right" else 4
+            label = axes.annotate(
+                f"{float(f'{values[row]:.3g}'):g} {found.posture(row)}", (values[row], place), (gap, 0),
+                textcoords="offset points", ha=side, va="center", fontsize=9, color=INK,
+            )  # fmt: skip
+            label.set_in_layout(False)  # it has its room within the axes
+            labels.append(label)
+    axes.set_yticks(range(len(own)), [words for words, _ in own])
+    axes.invert_yaxis()
+    axes.grid(False, axis="y")
+    axes.set_xlabel(unit)
+    return labels
+
+
+def _make_room(axes: Axes, labels: list[Annotation]) -> None:
+    """Set limits of x between which bars and labels, left and right of their ends, fit into the width of drawn axes."""
+    width = axes.get_window_extent().width
+    ends = np.array([label.xy[0] for label in labels])
+    room = np.array([label.get_window_extent().width + GAP for label in labels])
+    sides = np.array([-1.0 if label.get_horizontalalignment() == "right" else 1.0 for label in labels])
+    span = float(np.ptp(ends)) or 1.0
+    for share in np.linspace(1.0, LEAST_BAR_WIDTH, 50):  # of the width, for what the bars span
+        reach = ends + sides * room * span / (share * width)
+        if np.ptp(reach) <= span / share:
+            break
+    axes.set_xlim(reach.min(), reach.max())
+    if ends.min() >= 0.0:  # there are no negative frequencies and stresses, only room for words
+        axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= reach.max()])
+
+
+def response_picture(path: Path, title: str, unit: str, response: FrequencyResponse, natural: Array) -> None:
+    """Draw amplitudes of tip, joint angles and cylinder forces over frequency, with lines at the `natural` frequencies, Hz."""
+    per = f"per {unit}"
+    panels: list[tuple[str, ComplexArray, list[str]]] = [
+        (f"tip, m {per}", response.tip, ["x", "y"]),
+        (f"tip acceleration, m/s² {per}", response.tip_acceleration, ["x", "y"]),
+        (f"joint angles, rad {per}", response.joints, _numbered(response.joints)),
+        (f"cylinder forces, N {per}", response.cylinder_forces, _numbered(response.cylinder_forces)),
+    ]
+    with picture(path, title, "dotted: natural frequencies without damping") as figure:
+        grid = figure.subplots(2, 2, sharex=True)
+        for axes, (name, values, labels) in zip(grid.flat, panels, strict=True):
+            _amplitudes(axes, response.frequencies, values, labels)
+            axes.set_title(name)
+            for frequency in natural:
+                axes.axvline(frequency, color=GREY, linewidth=0.9, linestyle=":")
+            legend_above(axes, len(labels))
+        for axes in grid[1]:
+            axes.set_xlabel("frequency, Hz")
+
+
+def _numbered(values: ComplexArray) -> list[str]:
+    return [str(i + 1) for i in range(values.shape[1])]
+
+
+def _amplitudes(axes: Axes, frequencies: Array, values: ComplexArray, labels: list[str]) -> None:
+    from matplotlib.ticker import StrMethodFormatter
+
+    for i, (label, column) in enumerate(zip(labels, np.abs(values).T, strict=True)):
+        if np.any(column > 0.0):
+            axes.plot(frequencies, column, color=TONES[i % len(TONES)][0], label=label)
+    axes.set_xscale("log")
+    if np.any(np.abs(values) > 0.0):
+        axes.set_yscale("log")
+    axes.set_xlim(frequencies[0], frequencies[-1])
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
+def steady_state_picture(path: Path, title: str, found: SteadyState) -> None:
+    """Draw one period of the load and of the tip's displacement and acceleration; and the harmonics of the displacement."""
+    with picture(path, title) as figure:
+        grid = figure.subplots(2, 2)
+        rows = [
+            (grid[0, 0], "load at the tip, N", found.load.forces),
+            (grid[1, 0], "tip from its place at rest, mm", 1e3 * found.tip),
+            (grid[0, 1], "tip acceleration, m/s²", found.tip_acceleration),
+        ]
+        for axes, name, values in rows:
+            for column, colour, label in zip(values.T, (BLUE, ORANGE), "xy", strict=True):
+                axes.plot(found.times, column, color=colour, label=label)
+            axes.set_title(name)
+            axes.set_xlim(0.0, found.load.period)
+            axes.set_xlabel("time in the period, s")
+            legend_above(axes, 2)
+        bars, count = grid[1, 1], min(25, len(found.harmonics))
+        bars.bar(np.arange(1, count + 1) / found.load.period, 1e3 * found.harmonics[:count], 0.6 / found.load.period, color=INK)
+        bars.set_title("harmonics of the tip's displacement, mm")
+        bars.set_xlabel("frequency, Hz")
+
+
+def resonance_picture(path: Path, title: str, found: ResonanceMap) -> None:
+    """Draw the swing of the tip over postures (rows) and rates; rates to avoid are framed."""
+    from matplotlib.colors import LogNorm
+
+    rows, edges = len(found.postures), _edges(found.rates)
+    with picture(path, title, "framed: rates to avoid", (16.0, 2.6 + max(3.0, 0.42 * rows))) as figure:
+        axes = figure.subplots()
+        swing = np.maximum(1e3 * found.swing, 1e-3)
+        mesh = axes.pcolormesh(edges, np.arange(rows + 1) - 0.5, swing, norm=LogNorm(), cmap="cividis")
+        for band in found.to_avoid():
+            row = found.postures.index(band.posture)
+            low, high = edges[np.searchsorted(found.rates, band.low)], edges[np.searchsorted(found.rates, band.high) + 1]
+            axes.plot([low, high, high, low, low], row + 0.46 * np.array([-1, -1, 1, 1, -1]), color=ORANGE, linewidth=2.2)
+        axes.set_yticks(range(rows), found.postures)
+        axes.set_ylim(rows - 0.5, -0.5)
+        axes.set_xlabel("pump rate, Hz")
+        axes.grid(False)
+        figure.colorbar(mesh, ax=axes, label="swing of the tip, peak to peak, mm")
+
+
+def _edges(rates: Array) -> Array:
+    """Return borders (r + 1,) between ascending `rates` (r,), and outside of the first and last."""
+    if len(rates) == 1:
+        return np.array([0.95, 1.05]) * rates
+    middle = 0.5 * (rates[1:] + rates[:-1])
+    return np.concatenate([[2.0 * rates[0] - middle[0]], middle, [2.0 * rates[-1] - middle[-1]]])

@@ -1,1 +1,0 @@
-"""Stability on stiff and extreme cases."""
