@@ -25,7 +25,7 @@ help:
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs, play in pins: docs/study (20 minutes)"
 	@echo "make gate        hashes of sessions, commands and studies, speed as ratios; BEFORE=gate.json of an earlier run compares (5 minutes)"
-	@echo "make soak        the live node for an hour at 200 Hz and 10 minutes at 1 kHz, 10 of the live page, a million steps with contact, 1000 kills"
+	@echo "make soak        the live node for an hour at 200 Hz and 10 minutes at 1 kHz, 10 of the live page, a million steps with contact"
 	@echo "make fuzz        broken and hostile scenes, sessions and messages at random, 10 minutes: SECONDS=600 SEED=1"
 	@echo "make session     make the bundled sessions anew on the virtual rig, into out/arch_session and out/pump_session"
 	@echo "make figures     make the pictures of the documentation anew"
@@ -78,7 +78,7 @@ test-extra: $(READY) warm $(COLCON_READY) ament client
 
 study: $(READY) warm
 	for kind in error stability parts; do $(BIN)/boom_twin study $$kind --out out/study/$$kind || exit 1; done
-	for kind in papers clearance roundoff; do PYTHONPATH=test $(BIN)/python -m studies $$kind --out out/study/$$kind || exit 1; done
+	for kind in papers clearance; do PYTHONPATH=test $(BIN)/python -m studies $$kind --out out/study/$$kind || exit 1; done
 	mkdir -p docs/study && cp out/study/*/*.md out/study/*/*.png docs/study/
 
 BEFORE ?=
@@ -89,7 +89,6 @@ soak: $(READY) warm
 	$(BIN)/python test/bench/soak.py --duration 3600
 	$(BIN)/python test/bench/soak.py --rate 1000
 	$(BIN)/python test/bench/monitor.py --seconds 600
-	$(BIN)/python test/bench/kills.py
 
 SECONDS ?= 600
 SEED ?= 1

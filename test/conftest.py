@@ -30,8 +30,7 @@ FIRST = (
 SYSTEM = (
     "batch/", "cli/test_isolation", "cli/test_start_up", "docs/test_examples",
     "extending/", "kernels/test_kernel_cache", "kernels/test_uncompiled", "monitor/test_monitor_browser",
-    "monitor/test_monitor_connections", "offline/test_kills",
-    "ros/", "test_made_once",
+    "monitor/test_monitor_connections", "ros/",
 )  # fmt: skip
 """Folders and files whose tests start processes; single ones elsewhere have the mark themselves."""
 

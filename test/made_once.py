@@ -15,15 +15,10 @@ Value = TypeVar("Value")
 
 
 class MadeOnce:
-    """The first process that wants a thing makes it, under a lock; the others wait, then read it.
+    """The first process that wants a thing makes it, under a lock; the others wait, then read it from this run's `store`.
 
     What is handed out is the caller's own: a copy of the folder, or an object that was unpickled. So no test can spoil it for
     another process, and a thing must only depend on the sources of this checkout, not on who asks.
-
-    Parameters
-    ----------
-    store : Path
-        A folder of this run, the same one in all its processes; a later run has another.
     """
 
     def __init__(self, store: Path) -> None:

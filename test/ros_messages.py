@@ -9,13 +9,13 @@ import numpy as np
 from boom_twin import Stream
 from boom_twin.messages.report_encoder import ReportEncoder, decode_changes, decode_health, encode_changes, encode_health
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
-from boom_twin.messages.topic_table import TYPES, Output, Topic, Topics, load_topics
-from boom_twin.messages.type_store import decode, fill_header, jazzy, new_message
+from boom_twin.messages.topic_table import TYPES, Output, Qos, Topic, Topics, every_input, load_topics
+from boom_twin.messages.type_store import PADDING, decode, fill_header, jazzy, new_message
 
 __all__ = [
-    "IMU", "JOINT_STATE", "TYPES", "Output", "ReportEncoder", "SampleDecoder", "Topic", "Topics", "decode", "decode_changes",
-    "decode_health", "decoded", "encode_changes", "encode_health", "encoded", "fill_header", "imu", "jazzy", "joint_state",
-    "load_topics", "new_message", "stamp_of",
+    "IMU", "JOINT_STATE", "PADDING", "TYPES", "Output", "Qos", "ReportEncoder", "SampleDecoder", "Topic", "Topics",
+    "decode", "decode_changes", "decode_health", "decoded", "encode_changes", "encode_health", "encoded", "every_input",
+    "fill_header", "imu", "jazzy", "joint_state", "load_topics", "new_message", "stamp_of",
 ]  # fmt: skip
 
 JOINT_STATE, IMU = TYPES[Stream.STROKES], TYPES[Stream.IMU]

@@ -31,16 +31,10 @@ def joint_state(stamp: int, names: Sequence[str] | str, values: Sequence[float])
 
 
 class Rig:
-    """A boom at rest in a posture whose sensors are sent to a node, and who listens to it.
+    """A boom at rest in a posture whose sensors are sent to a node, and who listens to it. Its time goes on with its samples.
 
-    Attributes
-    ----------
-    stamp : int
-        Of the newest sample, ns. The rig's time goes on with its samples only.
-    answers : list of (int, float)
-        Stamps of the tip's predictions, and their distance from the boom's equilibrium, m.
-    residuals : list of float
-        Largest of each message.
+    `stamp` (ns) of the newest one. `answers`: stamps of the tip's predictions and their distance (m) from the equilibrium.
+    `residuals`: the largest of each message.
     """
 
     def __init__(self, namespace: str = "", posture: str = "arch") -> None:

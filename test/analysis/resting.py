@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from compiled import first_row, rest_at, taken_apart
 from default_boom import posture_angles, strokes_of_posture
-
-from boom_twin.analysis.equilibrium import rest_at
-from boom_twin.compiler.plan import first_row, taken_apart
 
 
 @dataclass(frozen=True)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from analysis.resting import at_rest
 from default_boom import motion_of, strokes_of_posture
-from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, load_scene, simulate
+from boom_twin import load_scene, simulate
 from boom_twin.analysis.bending_stress import BendingStressModel, increments_by_tip_force, moments_by_unknowns, stations
-from boom_twin.deviation.estimate_row import WIDTH
-from boom_twin.twin.blocks import estimate_of
 from boom_twin.validation.rig import solve
 from boom_twin.validation.rig.system import Boom, section_frames
 
@@ -96,18 +91,3 @@ def test_a_force_at_the_tip_bends_as_a_payload_does():
     loaded, moved, _ = at_rest(heavy, "arch")
     more = moments_by_unknowns(loaded) @ moved.z - moments_by_unknowns(plan) @ state.z
     assert influence @ [0.0, -0.5 * 9.81] == pytest.approx(more, rel=2e-3, abs=0.02)
-
-
-def test_what_sensors_know_beyond_the_prediction_is_added_with_its_deviation():
-    strokes, model = strokes_of_posture(SCENE, "horizontal"), BendingStressModel(SCENE)
-    prediction = drive_twin(SCENE).update(Sample(Stream.STROKES, 10**9, strokes)).prediction
-    load, variance = np.array([0.0, -100.0]), np.array([0.0, 400.0])
-    estimate = replace(estimate_of(10**9, np.zeros(WIDTH)), load=load, load_variance=variance)
-    found, bare = model.at(prediction, estimate), model.at(prediction, None)
-    assert prediction.moments.shape == (len(model.stations),) and model.stations[0].name == "section 1 at 0.60 m"
-    assert prediction.moments[0] == pytest.approx(-33038.1, rel=1e-3)
-    assert np.isnan(bare.moment_sigmas).all()
-    arm = 13.46 - 0.6  # the first station of section 1, inboard of the first pin C
-    assert found.moments[0] - bare.moments[0] == pytest.approx(-100.0 * arm, rel=2e-2)
-    assert found.moment_sigmas == pytest.approx(0.2 * np.abs(found.moments - bare.moments), rel=1e-9)
-    assert found.stresses == pytest.approx(found.moments / model.moduli)

@@ -13,8 +13,7 @@ from oracle import booms
 from oracle.clearance.scenes import with_pins
 from oracle.oscillation import mean_frequency
 
-from boom_twin import UsageError, load_scene, simulate, statics
-from boom_twin.analysis.methods import Method, integrate_with
+from boom_twin import load_scene, simulate, statics
 from boom_twin.analysis.simulate import course_of
 
 STIFFNESS, DAMPING = 5.0e6, 5.0e4  # N m/rad, N m s/rad
@@ -78,11 +77,6 @@ def test_balances_close_with_worn_pins_on_the_base():
     assert momentum.linear_share < 1e-7 and momentum.angular_share < 2e-5
 
 
-def test_the_plain_product_refuses_it():
-    with pytest.raises(UsageError, match=r"base\.stiffness"):
-        integrate_with(SCENE, motion_of(SCENE), 0.1, 1e-3, method=Method(product="plain"))
-
-
 def test_a_session_of_the_rig_replays(tmp_path, capsys):
     """The session carries its scene; without the hinge the twin is off by its turn times the reach."""
     pytest.importorskip("exudyn")
@@ -97,19 +91,3 @@ def test_a_session_of_the_rig_replays(tmp_path, capsys):
         found = json.loads(capsys.readouterr().out)
         errors.append((found["tip_error_rms_m"], found["tip_estimate_error_rms_m"]))
     assert max(errors[0]) < 2e-3 and min(errors[1]) > 0.03
-
-
-def test_commands(tmp_path, capsys):
-    path = tmp_path / "boom.yaml"
-    path.write_text(anew(SCENE))
-    assert main(["check", str(path)]) == 0
-    told = capsys.readouterr().out
-    assert "elastic base: 5 MN m/rad about the pivot of joint 1, 50 kN m s/rad" in told
-    assert "base        1  turn" in told and "base.stiffness" not in told
-    assert main(["statics", str(path), "--posture", "arch", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["base_turn_rad"] == pytest.approx(-4.880e-3, rel=1e-3)
-    path.write_text(anew(booms.on_elastic_base(RIGID, None, DAMPING)))
-    assert main(["check", str(path)]) == 1
-    told = capsys.readouterr().err
-    assert "base.damping = 50000.0" in told and "the base is rigid" in told and "Give stiffness" in told

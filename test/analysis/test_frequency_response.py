@@ -196,29 +196,3 @@ def test_sine_sweep_through_simulate():
     ):
         expected = in_time(own, spectrum, within, count, len(times))
         assert np.sqrt(np.mean((seen - expected) ** 2)) < 0.01 * np.sqrt(np.mean(expected**2))
-
-
-@pytest.mark.parametrize(
-    "given, told",
-    [
-        ({"posture": "nowhere"}, "posture = 'nowhere'"),
-        ({}, "give either strokes or a posture"),
-        ({"posture": "arch", "drive": 5}, "cylinders 1 to 4"),
-        ({"posture": "arch", "drive": 1, "tip_force": (0.0, 1.0)}, "give one of them"),
-        ({"posture": "arch", "frequencies": [-1.0]}, "at least 0 Hz"),
-    ],
-)
-def test_refused(given, told):
-    with pytest.raises(UsageError, match=told):
-        frequency_response(load_scene(), **{"frequencies": [1.0]} | given)
-
-
-def test_every_station_has_a_column_of_its_own_and_the_text_is_short() -> None:
-    """Both sides of a split had one name, and the moment inboard of it was lost."""
-    found = frequency_response(load_scene(), np.array([0.5, 1.0, 2.0]), posture="arch")
-    columns = [name for name in found.channels() if name.startswith("moment_")]
-    assert len(columns) == len(found.stations) == found.moments.shape[1]
-    assert "moment_section_1_at_3.04_inboard_Nm" in columns and "moment_section_1_at_3.04_outboard_Nm" in columns
-    assert (
-        repr(found).startswith("FrequencyResponse(frequencies 3, 0.5 to 2 Hz; largest tip amplitude") and len(repr(found)) < 120
-    )

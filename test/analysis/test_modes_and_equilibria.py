@@ -9,7 +9,7 @@ from default_boom import strokes_of_angles
 from oracle import booms, segments
 from scipy.linalg import eigh, null_space
 
-from boom_twin import SolverError, UsageError, load_scene, statics
+from boom_twin import SolverError, load_scene, statics
 from boom_twin.analysis.modal import damping_ratio, natural_modes
 from boom_twin.validation.study import scenes as made
 
@@ -83,20 +83,6 @@ def test_overloaded_linkage_has_no_equilibrium():
         segments.equilibrium(segments.Segments(scene, 1), segments.Segments(scene, 0).lengths(angles), angles)
     with pytest.raises(SolverError, match="no equilibrium at strokes"):
         statics(scene, posture="folded")
-
-
-@pytest.mark.parametrize(
-    "asked, words",
-    [
-        ({}, "either strokes or a posture"),
-        ({"posture": "bow"}, "horizontal"),
-        ({"strokes": np.zeros(3)}, "4 cylinders"),
-        ({"strokes": np.array([0.1, 0.1, 5.0, 0.1])}, "stroke_3"),
-    ],
-)
-def test_wrong_questions_get_one_clear_answer(asked, words):
-    with pytest.raises(UsageError, match=words):
-        statics(load_scene(), **asked)
 
 
 def test_what_no_boom_carries_is_refused_with_the_share_that_it_does():

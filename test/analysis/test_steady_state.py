@@ -101,15 +101,6 @@ def test_rows_refused(times, forces, told):
         load_of_rows(np.array(times), np.array(forces, dtype=float))
 
 
-@pytest.mark.parametrize(
-    "given, told",
-    [((0.0, 130.0), "rate = 0"), ((1e-4, 130.0), "10000 s"), ((0.4, -1.0), "height"), ((2.0, 130.0, 0.4), "0.25 s")],
-)
-def test_pumps_refused(given, told):
-    with pytest.raises(UsageError, match=told):
-        pump_load(SCENE, *given)
-
-
 def test_map_names_the_rates_whose_harmonics_meet_the_first_mode():
     rates = np.linspace(0.28, 0.46, 37)
     found = resonance_map(

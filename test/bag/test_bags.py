@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from recordings import FILE_NAME, MessageWriter, Session, read, read_metadata, recover, scan, write_metadata, write_session
-from ros_messages import Topic, jazzy, load_topics, new_message
+from ros_messages import Qos, Topic, jazzy, load_topics, new_message, stamp_of
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
@@ -18,7 +18,6 @@ from ruamel.yaml import YAML
 
 from boom_twin import BagError, Stream
 from boom_twin.bag.inspect import inspect
-from boom_twin.messages.topic_table import Qos
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
 POINT = Topic(
@@ -57,7 +56,7 @@ def test_what_is_written_is_read(bag: Path, arrays: dict[str, Any], wanted: dict
     forces = [(msg.linear_acceleration.x, msg.linear_acceleration.z) for msg in rows["tip_imu"]]
     np.testing.assert_array_equal(forces, arrays["imu"])
     assert rows["joint_angles"][5].name == ["joint_1", "joint_2", "joint_3"]
-    stamps = [msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec for msg in rows["tip_imu"]]
+    stamps = [stamp_of(msg) for msg in rows["tip_imu"]]
     assert stamps == arrays["stamps_ns"].tolist()
 
 

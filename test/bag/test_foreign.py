@@ -11,15 +11,14 @@ from typing import Any
 import pytest
 import zstandard
 from command import main
+from fuzz.mcap_files import Entry, write
 from mcap.reader import make_reader
-from mcap.writer import Writer
 from recordings import FILE_NAME, Session, read, scan
 from ros_messages import jazzy
 
 from boom_twin import BagError
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
-Entry = tuple[str, str, str, int, bytes]  # topic, type, encoding, log time (ns), data
 JOINT_STATE, IMU = "sensor_msgs/msg/JointState", "sensor_msgs/msg/Imu"
 IDL = b"""module sensor_msgs { module msg { struct JointState { std_msgs::msg::Header header; sequence<string> name;
 sequence<double> position; sequence<double> velocity; sequence<double> effort; }; }; };"""
@@ -28,20 +27,6 @@ sequence<double> position; sequence<double> velocity; sequence<double> effort; }
 def messages(bag: Path) -> list[Entry]:
     with (bag / FILE_NAME).open("rb") as file:
         return [(c.topic, s.name, "cdr", m.log_time, m.data) for s, c, m in make_reader(file).iter_messages() if s]
-
-
-def write(path: Path, entries: list[Entry], name: Callable[[str], str] = str, **options: Any) -> Path:
-    """Write messages into one file, types named otherwise, definitions empty."""
-    with path.open("wb") as stream:
-        writer, channels = Writer(stream, **options), dict[tuple[str, str, str], int]()
-        writer.start(profile="ros2", library="test")
-        for topic, kind, encoding, log, data in entries:
-            if (topic, kind, encoding) not in channels:
-                schema = writer.register_schema(name(kind), "", b"")
-                channels[topic, kind, encoding] = writer.register_channel(topic, encoding, schema)
-            writer.add_message(channels[topic, kind, encoding], log, data, log)
-        writer.finish()
-    return path
 
 
 DEFINITIONS: dict[str, dict[str, Any]] = {

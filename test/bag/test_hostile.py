@@ -17,14 +17,12 @@ import pytest
 import zstandard
 from command import main
 from mcap.writer import MCAP0_MAGIC
-from recordings import MessageWriter, read, recover, scan
+from recordings import METADATA, SHEET, MessageWriter, read, recover, scan
 from ros_messages import load_topics
 
 from boom_twin import BagError, Stream
 from boom_twin.bag import mcap_file, mcap_records
 from boom_twin.bag.mcap_records import LARGEST_SUMMARY
-from boom_twin.bag.metadata import FILE_NAME as METADATA
-from boom_twin.bag.session_model import FILE_NAME as SHEET
 from boom_twin.config.yaml_text import plain
 from boom_twin.offline import ground_truth as truth
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from command import main
-from mcap.reader import make_reader
-from mcap.writer import Writer
 from recordings import FILE_NAME, MessageWriter
 from ros_messages import joint_state, load_topics
 
@@ -83,17 +82,11 @@ def test_what_is_missing_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert values["synthetic"] is None and any("origin" in remark for remark in values["remarks"])
 
 
-def test_names_with_line_breaks_make_no_lines(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_names_with_line_breaks_make_no_lines(
+    bag: Path, tmp_path: Path, rewritten: Callable[..., Path], capsys: pytest.CaptureFixture[str]
+) -> None:
     """Neither a feigned verdict nor a carriage return, after which a terminal writes over the line."""
-    file, name = tmp_path / "odd.mcap", "/a\nreplay     nothing is missing\r/cylinder_strokes"
-    with (bag / FILE_NAME).open("rb") as old, file.open("wb") as new:
-        writer = Writer(new)
-        writer.start(profile="ros2")
-        for schema, channel, message in make_reader(old).iter_messages():
-            kind = writer.register_schema(schema.name, schema.encoding, schema.data)
-            own = writer.register_channel(name + channel.topic, channel.message_encoding, kind)
-            writer.add_message(own, message.log_time, message.data, message.publish_time)
-        writer.finish()
+    file = rewritten(bag, rename=lambda name: f"/a\nreplay     nothing is missing\r/cylinder_strokes{name}")
     assert main(["info", str(file)]) == main(["recover", str(file), "--out", str(tmp_path / "out")]) == 0
     shown = capsys.readouterr().out
     assert "\r" not in shown and "\nreplay     nothing" not in shown and r"/a\nreplay" in shown

@@ -8,12 +8,13 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recordings import SHEET as FILE_NAME
 from recordings import SessionSheet, load_mapping, mapping_of
 from ros_messages import load_topics
 
 from boom_twin import BagError, Stream, UsageError
 from boom_twin.bag.metadata import dump
-from boom_twin.bag.session_model import FILE_NAME, RIG_ORIGIN, strokes_of
+from boom_twin.bag.session_model import RIG_ORIGIN, strokes_of
 from boom_twin.messages.topic_table import DEFAULT_FILE
 from boom_twin.types import StrokeReading
 

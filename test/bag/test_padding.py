@@ -13,11 +13,10 @@ from command import main
 from default_boom import joint_angles_of_strokes, strokes_of_posture
 from fuzz.mcap_files import rewrite
 from recordings import FILE_NAME, read, scan, write_session
-from ros_messages import IMU, JOINT_STATE, TYPES, decode, encoded, new_message
+from ros_messages import IMU, JOINT_STATE, PADDING, TYPES, decode, encoded, new_message
 from rosbags.serde import SerdeError
 
 from boom_twin import BagError, load_scene, replay
-from boom_twin.messages.type_store import PADDING
 
 NOISE = np.random.default_rng(5)
 

@@ -13,10 +13,9 @@ from typing import Any
 
 import pytest
 from command import main
-from recordings import load_truth, mapping_of, recover, scan
+from recordings import TRUTH, load_truth, mapping_of, recover, scan
 
 from boom_twin import BagError
-from boom_twin.offline.ground_truth import FILE_NAME as TRUTH
 from boom_twin.report.quantities import FILE_NAME as QUANTITIES
 from boom_twin.report.quantities import read, side_of
 from boom_twin.system.received_files import open_received

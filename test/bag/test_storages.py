@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import sqlite3
 from collections.abc import Callable
@@ -13,23 +12,18 @@ import numpy as np
 import pytest
 from command import main
 from default_boom import strokes_of_posture
+from gate_sessions import write, write_csv
 from recordings import Session, read_both, recover, scan, write_session
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from boom_twin import BagError, TimeWindow, load_scene, replay
 from boom_twin.batch.folder import sessions_of
-from boom_twin.offline.inputs import ReplayOptions
-from boom_twin.offline.replay import replay_into
-from boom_twin.offline.sample_table import SampleTable, columns_of, table_file
-from boom_twin.system.result_folder import REPLAY, result_folder
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
 JAZZY, NOETIC = get_typestore(Stores.ROS2_JAZZY), get_typestore(Stores.ROS1_NOETIC)
 KINDS = ("db3", "db3 file", "ros1", "ros1 bz2", "ros1 lz4")
-COLUMN = {"/cylinder_strokes": "stroke_{}_m", "/joint_angles": "joint_{}_rad"}
 
 
 def messages(session: Session) -> list[tuple[str, int, bytes, Any]]:
@@ -41,10 +35,7 @@ def stored(source: Path, kind: str, out: Path) -> Path:
     session = scan(source)
     types = {topic.name: topic.type for topic in session.topics}
     if kind.startswith("db3"):
-        with Ros2Writer(out / "two", version=9, storage_plugin=StoragePlugin.SQLITE3) as bag:
-            two = {name: bag.add_connection(name, kind, typestore=JAZZY) for name, kind in types.items()}
-            for name, time, data, _ in messages(session):
-                bag.write(two[name], time, data)
+        write(out / "two", types, [row[:3] for row in messages(session)], StoragePlugin.SQLITE3)
         return out / "two" / "two.db3" if kind == "db3 file" else out / "two"
     writer = Ros1Writer(out / "one.bag")
     if kind != "ros1":
@@ -54,25 +45,6 @@ def stored(source: Path, kind: str, out: Path) -> Path:
         for name, time, data, _ in messages(session):
             old.write(one[name], time, JAZZY.cdr_to_ros1(data, types[name]))
     return out / "one.bag"
-
-
-def as_csv(source: Path, out: Path, since: int = 0) -> Path:
-    """The session as CSV, times since a stamp (ns)."""
-    rows: dict[int, dict[str, str]] = {}
-    for name, _, _, message in messages(scan(source)):
-        row = rows.setdefault(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec, {})
-        if name in COLUMN:
-            pairs = zip(message.name, message.position, strict=True)
-            row.update({COLUMN[name].format(channel.split("_")[1]): repr(float(value)) for channel, value in pairs})
-        else:
-            row.update({f"imu_{axis}_m_s2": repr(float(getattr(message.linear_acceleration, axis))) for axis in "xz"})
-    columns = ["t_s", *dict.fromkeys(name for row in rows.values() for name in row)]
-    with out.open("w", newline="") as file:
-        writer = csv.DictWriter(file, columns)
-        writer.writeheader()
-        for stamp, row in sorted(rows.items()):
-            writer.writerow({"t_s": f"{(stamp - since) // 10**9}.{(stamp - since) % 10**9:09d}", **row})
-    return out
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -88,7 +60,8 @@ def test_every_message_is_read_as_from_mcap(bag: Path, tmp_path: Path, content: 
 
 
 def test_csv_is_read_as_the_samples_that_it_holds(bag: Path, tmp_path: Path, content: Content) -> None:
-    assert content(scan(as_csv(bag, tmp_path / "s.csv"))) == content(scan(bag))
+    write_csv(bag, tmp_path / "s.csv")
+    assert content(scan(tmp_path / "s.csv")) == content(scan(bag))
 
 
 def moving(folder: Path) -> Path:
@@ -99,26 +72,6 @@ def moving(folder: Path) -> Path:
     imu = random.normal((0.0, 9.81), 0.05, (rows, 2))
     write_session(folder, stamps, strokes + random.normal(0.0, 2e-5, (rows, 4)), None, imu, {"origin": "synthetic, a test"})
     return folder
-
-
-def table_of(session: Path, out: Path) -> bytes:
-    with result_folder(out, REPLAY, [session]) as building:
-        file = table_file(building / "samples.csv", columns_of(4))
-        table = SampleTable(file.write, 4)
-        replay_into(building, session, load_scene(), options=ReplayOptions(health=False), take=table.add)
-        table.finish()
-        file.close()
-    return (out / "samples.csv").read_bytes()
-
-
-@pytest.mark.slow
-def test_replays_of_one_session_from_four_storages_give_the_same_table(tmp_path: Path) -> None:
-    source = moving(tmp_path / "mcap")
-    others = [stored(source, "db3", tmp_path), stored(source, "ros1", tmp_path)]
-    others.append(as_csv(source, tmp_path / "s.csv", since=1_700_000_000_000_000_000))  # its times begin with 0
-    expected = table_of(source, tmp_path / "a")
-    assert expected.count(b"\n") == 401
-    assert [table_of(other, tmp_path / f"out_{number}") == expected for number, other in enumerate(others)] == [True] * 3
 
 
 CSV = "t_s,stroke_1_m,stroke_2_m,joint_1_rad\n0,0.1,0.2,0.3\n0.1,0.1,0.2,\n"

@@ -8,14 +8,12 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from drive_twin import ARCH_DRIVES
 from health.recorded import written
 from page_outline import outline
 
@@ -25,9 +23,7 @@ pytest.importorskip("distributed")
 
 from command import main  # noqa: E402
 
-from boom_twin import load_scene, replay  # noqa: E402
-from boom_twin.batch.session_task import SessionTask, row_of  # noqa: E402
-from boom_twin.calibration import calibrate  # noqa: E402
+from boom_twin import replay  # noqa: E402
 from boom_twin.system.processes import python_command  # noqa: E402
 
 COUNT = 5
@@ -175,53 +171,3 @@ def test_a_name_that_is_not_utf_8_costs_no_row(sessions: Path, tmp_path: Path, c
     rows = {row["session"]: row["status"] for row in parquet.read_table(out / "sessions.parquet").to_pylist()}
     assert rows == {"caf?": "ok", "torn": "failed"}, capsys.readouterr()
     assert "caf?" in (out / "batch.html").read_text(encoding="utf-8")
-
-
-def test_only_a_batch_is_gone_on_with(sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "mine.txt").write_text("x")
-    for out, told in ((tmp_path, "which no batch left"), (sessions, "a source is never touched")):
-        assert main(["batch", str(sessions / "s0"), "--out", str(out)]) == 1
-        assert told in capsys.readouterr().err
-    assert (tmp_path / "mine.txt").read_text() == "x" and len(list(tmp_path.iterdir())) == 1
-
-
-def test_no_scheduler_answers(
-    sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("boom_twin.batch.session_task.CONNECT_TIMEOUT", 0.5)
-    assert main(["batch", str(sessions / "s0"), "--out", str(tmp_path / "o"), "--scheduler", "tcp://127.0.0.1:1"]) == 1
-    assert "no Dask scheduler answers" in capsys.readouterr().err
-
-
-def task(key: str = "key", session: object = "s", out: object = "o", **changes: object) -> SessionTask:
-    given = {"fingerprint": "", "report": False, "keep_bag": False, "time": 600.0, "memory": 10**9, "retries": 0} | changes
-    for name in ("scene", "params", "mapping"):
-        given.setdefault(name, None)
-    return SessionTask(key, str(session), str(out), **given)  # type: ignore[arg-type]
-
-
-def test_a_session_that_tells_no_parameters_costs_these_only(sessions: Path, tmp_path: Path) -> None:
-    row = row_of(task("key", sessions / "s0", tmp_path / "out", calibrate=True))
-    assert row["status"] == "ok" and row["output_sha256"] and row["calibration_reason"]
-    assert not [name for name in row if name.startswith("calibrated_")]
-
-
-@pytest.mark.slow
-def test_parameters_of_a_session_are_those_of_a_calibration(tmp_path: Path) -> None:
-    bag = ARCH_DRIVES
-    row, found = row_of(task("key", bag, tmp_path / "out", calibrate=True)), calibrate([bag], load_scene())
-    told = {each.unknown.name: each for each in found.estimates if each.told}
-    names = {name.removeprefix("calibrated_") for name in row if name.startswith("calibrated_") and not name.endswith("_sigma")}
-    assert names == told.keys() >= {f"cylinder_{i}.k" for i in (1, 2, 3, 4)}
-    for name, each in told.items():
-        assert row[f"calibrated_{name}"] == each.value
-        assert each.low < row[f"calibrated_{name}"] < each.high and row[f"calibrated_{name}_sigma"] > 0.0
-    assert "calibration_reason" not in row and row["calibration_misfit"] == found.misfit
-
-
-def test_without_the_extra_one_line_tells_what_to_install(
-    sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert main(["batch", str(sessions / "s0"), "--out", str(tmp_path / "out")]) == 1
-    assert 'pip install "boom_twin[batch]"' in capsys.readouterr().err

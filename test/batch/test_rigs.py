@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from command import main
 from drive_twin import ARCH_DRIVES
-from health.recorded import session, written
+from health.recorded import written
 from recordings import write_session
 from scipy import stats
+from session_readings import rows_in
 
-from boom_twin import Stream
 from boom_twin.batch.results import rigs_of
 
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -95,12 +95,8 @@ def test_a_drift_that_cannot_be_known_is_not_told(rows: list[dict[str, Any]]) ->
 
 def named(folder: Path, name: str, rig: str, seconds: float) -> None:
     """A part of the bundled session, as of a rig with a name."""
-    streams = Stream.STROKES, Stream.ANGLES
-    found = [[each for each in session(seconds, ARCH_DRIVES) if each.stream is stream] for stream in streams]
-    count = min(map(len, found))
-    arrays = [np.array([each.values for each in rows[:count]]) for rows in found]
-    stamps = np.array([each.stamp for each in found[0][:count]])
-    write_session(folder / name, stamps, arrays[0], arrays[1], None, {"origin": "synthetic", "rig": rig})
+    stamps, strokes, joints, _ = rows_in(ARCH_DRIVES, seconds)
+    write_session(folder / name, stamps, strokes, joints, None, {"origin": "synthetic", "rig": rig})
 
 
 def test_a_batch_sums_up_the_damage_of_its_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -267,12 +267,7 @@ def main() -> None:
     print(f"load of the machine, 1 min {os.getloadavg()[0]:10.2f}")
 
 
-ROLES = {
-    "echo": echo,
-    "echo-events": echo_on_events,
-    "listen": listen,
-    "source": source,
-}
+ROLES = {"echo": echo, "echo-events": echo_on_events, "listen": listen, "source": source}
 
 if __name__ == "__main__":
     main()

@@ -20,21 +20,6 @@ def _scene(folder: Path, old: str, new: str) -> str:
     return str(path)
 
 
-def test_check_explains_the_default_scene(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check"]) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
-    for words in (
-        "4 sections, A + B1 + B2 + B3, 13.46 m, 665.5 kg",
-        "split at 3.044 m by the barrel pin C of cylinder 2",
-        "k = 40 kN/mm, d = 120 kN s/m",
-        "the pipe line is empty",
-        "Warnings: none",
-    ):
-        assert words in out, words
-    assert "Unknowns per step: 48\n  joints    20  2 + 6 + 6 + 6\n  sections  28  8 + 8 + 8 + 4\n" in out
-
-
 @pytest.mark.parametrize(("end", "code"), [("\n", 0), ("", 1)], ids=["whole line", "cut line"])
 def test_a_scene_without_end_mark_is_noted_and_strict_lets_it_pass(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], end: str, code: int

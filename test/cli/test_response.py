@@ -81,18 +81,13 @@ def test_worn_pins_answer_unless_they_rub(capsys: Capture, tmp_path: Path) -> No
     "given, told",
     [
         (["--posture", "nowhere"], "posture = 'nowhere'"),
-        (["--posture", "arch", "--from", "0"], "above 0 Hz"),
-        (["--posture", "arch", "--from", "5", "--to", "2"], "ascend"),
         (["--posture", "arch", "--drive", "9"], "cylinders 1 to 4"),
         (["--posture", "arch", "--tip", "1,2,3"], "two numbers"),
         (["--posture", "arch", "--pump", "0:130"], "rate = 0"),
         (["--posture", "arch", "--load", "nowhere.csv"], "nowhere.csv"),
         (["--map", "all"], "needs --pump"),
-        (["--map", "arch,nowhere", "--pump", "0.4:130"], "posture = 'nowhere'"),
         (["--posture", "arch", "--tip", "0,0"], "moves nothing. Give a force"),
         (["--posture", "arch", "--pump", "0.4:130", "--to", "5"], "--to: goes with a frequency response"),
-        (["--map", "arch", "--pump", "0.4:130", "--to", "5"], "--to: goes with a frequency response"),
-        (["--posture", "arch", "--rates", "0.2:0.5:5"], "--rates: goes with --map"),
     ],
 )
 def test_refused(capsys: Capture, given: list[str], told: str) -> None:

@@ -94,16 +94,6 @@ def test_the_lengths_of_a_result_give_the_same_motion(tmp_path: Path, capsys: py
     assert "in the first row at rest: posture arch has" in capsys.readouterr().err
 
 
-def test_lengths_need_their_columns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    given, out = written(tmp_path / "in.csv", "length", STROKES[:3]), str(tmp_path / "out.csv")
-    assert main(["simulate", "--lengths", written(tmp_path / "in.csv", "long", STROKES[:3]), "--out", out]) == 1
-    assert "no column length_1_m, length_2_m" in capsys.readouterr().err
-    for both in (["--lengths", given, "--drive", given], []):
-        with pytest.raises(SystemExit) as end:
-            main(["simulate", *both, "--out", out])
-        assert end.value.code == 2
-
-
 def test_statics_tells_lengths_beside_drives(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["statics", "--posture", "arch", "--json"]) == 0
     at_drives = json.loads(capsys.readouterr().out)

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from command import main
 from default_boom import default_text
 
-from boom_twin import __version__
-from boom_twin.cli.main import COMMANDS, EXAMPLES
 from boom_twin.cli.replay import flat
 
 STROKES = "0.63,0.165,0.235,0.187"
@@ -63,38 +58,6 @@ def test_section_angles_are_a_posture(posture: str, capsys: pytest.CaptureFixtur
     assert main(["response", "--posture", posture.strip(), "--tip", "-100,0", "--json"]) == 0
 
 
-@pytest.mark.parametrize(
-    ("posture", "told"),
-    [
-        ("up", "posture = 'up': the scene has horizontal, arch, high, low. Choose one of these"),
-        ("60,20", "posture = '60,20': 2 angles for 4 sections. Give one for each."),
-        ("60,20,90,0", "turns joint 3 to 70 deg, outside its range_deg"),
-        ("nan,0,0,0", "turns joint 1 to nan deg, outside its range_deg"),
-    ],
-)
-def test_section_angles_that_no_boom_takes_are_refused(posture: str, told: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["statics", "--posture", posture]) == 1
-    assert told in capsys.readouterr().err
-
-
-def helped(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    assert ended.value.code == 0
-    return capsys.readouterr().out
-
-
-def test_help_lists_every_command_and_ends_with_examples(capsys: pytest.CaptureFixture[str]) -> None:
-    assert helped(capsys, "--version") == f"boom_twin {__version__}\n"
-    whole = " ".join(helped(capsys, "--help").split())  # Python 3.13 breaks other lines
-    assert "exit codes: 0 done, 1 the input or the run failed" in whole
-    for name, purpose in COMMANDS.items():
-        assert f"{name} {purpose}" in whole
-        text = helped(capsys, name, "--help")
-        assert f"usage: boom_twin {name}" in text and "--quiet" in text
-        assert text.rstrip().endswith(f"boom_twin {EXAMPLES[name][-1]}")
-
-
 def test_quiet_leaves_out_what_is_no_result_and_no_failure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     session = str(Path(__file__).parents[2] / "bags" / "arch_session")
     assert main(["info", session]) == 0
@@ -106,17 +69,6 @@ def test_quiet_leaves_out_what_is_no_result_and_no_failure(tmp_path: Path, capsy
     assert capsys.readouterr().err.startswith("boom_twin info: ")
 
 
-@pytest.mark.system
-def test_the_shell_is_told_what_may_follow(tmp_path: Path) -> None:
-    pytest.importorskip("argcomplete", reason="pip install .[test]")
-    answer, line = tmp_path / "answer", "boom_twin replay bag --no-"
-    asked = {"_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "COMP_LINE": line, "COMP_POINT": str(len(line))}
-    command = [sys.executable, "-m", "boom_twin"]
-    environment = {**os.environ, **asked, "_ARGCOMPLETE_STDOUT_FILENAME": str(answer)}
-    subprocess.run(command, env=environment, capture_output=True, timeout=300)
-    assert {word.strip() for word in answer.read_text().split("\n")} >= {"--no-pictures", "--no-health", "--no-changes"}
-
-
 def test_a_summary_as_json_is_flat_and_has_its_alarms() -> None:
     alarm = {"channel": "joint_2", "kind": "residual", "from_s": 4.0, "to_s": None, "cause": "cylinder_2.k", "ranked": []}
     found = flat({"samples": 3, "events": {"not followed": 2}, "alarms": [alarm, {**alarm, "channel": "joint_3"}]})
@@ -124,9 +76,3 @@ def test_a_summary_as_json_is_flat_and_has_its_alarms() -> None:
         "samples": 3, "events_not_followed": 2, "alarm_channel": ["joint_2", "joint_3"], "alarm_kind": ["residual"] * 2,
         "alarm_from_s": [4.0] * 2, "alarm_to_s": [None] * 2, "alarm_cause": ["cylinder_2.k"] * 2,
     }  # fmt: skip
-
-
-def test_what_is_no_session_is_told_with_what_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "scene.yaml").write_text(default_text())
-    assert main(["info", str(tmp_path / "scene.yaml")]) == 1
-    assert "a file that ends with .mcap, .db3, .bag or .csv" in capsys.readouterr().err

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from compiled import RHO, compile_scene, settle, width_of
 
 from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
-from boom_twin.analysis.equilibrium import settle
-from boom_twin.analysis.simulate import RHO
-from boom_twin.compiler.compile import compile_scene
-from boom_twin.compiler.plan import width_of
 from boom_twin.kernels.integrators import GENERALISED_ALPHA
 from boom_twin.kernels.transfer.time_step import observe, run
 

@@ -16,13 +16,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from recordings import TRUTH, Session, read, scan, scene_of
+from ros_messages import Output, Topic, load_topics, stamp_of
 
 from boom_twin import BagError, BoomTwinError, Stream
-from boom_twin.bag.reader import Session, read, scan
-from boom_twin.bag.session_model import scene_of, settings_of
-from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.messages.topic_table import Output, Topic, load_topics
-from boom_twin.offline.ground_truth import FILE_NAME as TRUTH
+from boom_twin.bag.session_model import settings_of
 from boom_twin.offline.history import draw
 from boom_twin.offline.progress import progress_of
 from boom_twin.offline.recording import Stretch
@@ -39,18 +37,10 @@ from .processes import DemoProcesses, demo_processes
 
 @dataclass(frozen=True)
 class DemoResult:
-    """Result of a live run.
+    """Predicted tips (x, z of ``base_link``, m) by stamp, as they arrived, and how many residuals.
 
-    Attributes
-    ----------
-    positions : dict of int to (float, float)
-        Predicted tip (x, z of ``base_link``, m) by stamp, as it arrived.
-    residual_sets : int
-        Messages that arrived.
-    latency_ms : ndarray, shape (2,)
-        Median and 99 % quantile from the arrival of a stroke to that of its prediction, both at the recorder.
-    residual_rms : dict of str to float
-        Measured minus predicted by channel, in the unit of the sensor.
+    `latency_ms`: median and 99 % quantile from the arrival of a stroke to that of its prediction, both at the recorder.
+    `residual_rms`: measured minus predicted by channel, in the unit of the sensor.
     """
 
     positions: dict[int, tuple[float, float]]
@@ -85,13 +75,7 @@ class DemoResult:
 
 
 def score(recorded: Path) -> DemoResult:
-    """Return the results of one recorded run.
-
-    Raises
-    ------
-    BagError
-        The recording cannot be read, or holds no prediction.
-    """
+    """Return the results of one recorded run; BagError if it cannot be read, or holds no prediction."""
     topics, session = load_topics(), scan(recorded)
     arrived = _messages(session, topics.outputs[Output.TIP_POSITION])
     strokes = {stamp_of(msg): time for time, msg in _messages(session, topics.inputs[Stream.STROKES])}

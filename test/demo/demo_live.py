@@ -12,9 +12,9 @@ import time
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from recordings import scan, scene_of
+
 from boom_twin import BoomTwinError
-from boom_twin.bag.reader import scan
-from boom_twin.bag.session_model import scene_of
 from boom_twin.ros.startup import require_rclpy
 
 from .isolation import add_domain

@@ -22,8 +22,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ros_messages import Topics, load_topics
+
 from boom_twin import BoomTwinError
-from boom_twin.messages.topic_table import Topics, load_topics
 from boom_twin.ros.startup import require_rclpy
 
 USUAL, LARGEST = 101, 232
@@ -41,15 +42,9 @@ _REMOVED = ("ROS_DISCOVERY_SERVER", "ROS_STATIC_PEERS")
 
 @dataclass(frozen=True, slots=True)
 class Isolation:
-    """Claimed ROS domain.
+    """Claimed ROS domain, until every process that holds the descriptor `lock` has ended.
 
-    Attributes
-    ----------
-    domain : int
-    lock : int
-        File descriptor; the claim lasts until every process that holds it has ended.
-    is_open : bool
-        Whether other programs in the same domain are heard and hear: it was chosen, and there is no partition.
+    `is_open`: other programs in the domain are heard and hear, as it was chosen and has no partition.
     """
 
     domain: int
@@ -72,15 +67,8 @@ def add_domain(parser: ArgumentParser) -> None:
 def isolated(domain: int | None = None) -> Iterator[Isolation]:
     """Put this process, and those that it starts, into a claimed domain on this computer only, until the end.
 
-    Parameters
-    ----------
-    domain : int, optional
-        0 to 232: this one, without the partition, so that other tools can listen. By default any above `USUAL` that is free.
-
-    Raises
-    ------
-    BoomTwinError
-        No domain is free; somebody in it publishes the twin's topics or listens to its inputs.
+    By default any above `USUAL` that is free; a `domain` that is given has no partition, so that other tools can listen.
+    BoomTwinError: none is free, or somebody in it publishes the twin's topics or listens to its inputs.
     """
     require_rclpy()
     claimed, lock = _claim(_preferred() if domain is None else [domain])

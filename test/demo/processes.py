@@ -34,18 +34,9 @@ LISTENERS = 2
 
 
 class DemoProcess:
-    """Child process that runs a module of this package and writes its output into a log.
+    """Module of this package, run as a child that writes into a new `log` and ends in order by `end_signal`.
 
-    Parameters
-    ----------
-    arguments : list of str
-        The module and its arguments.
-    log : Path
-        New.
-    end_signal : Signals
-        What ends it in order.
-    lock : int
-        Of the domain, see `demo.isolation.Isolation`: held as long as this runs, even if its parent is killed.
+    It holds the domain's `lock` (`demo.isolation.Isolation`) as long as it runs, even if its parent is killed.
     """
 
     def __init__(self, arguments: list[str], log: Path, end_signal: signal.Signals, lock: int) -> None:
@@ -70,21 +61,9 @@ class DemoProcess:
 
 
 class DemoProcesses:
-    """Processes of a demonstration: node, recorder, and those that are started later.
+    """Node, recorder, and those that are started later.
 
-    Parameters
-    ----------
-    out : Path
-        Folder of the recording; logs and scene go beside it, under its name. No file that is there is written over.
-    scene : str
-        Text of the scene that the node is given.
-    lock : int
-        Of the domain.
-
-    Attributes
-    ----------
-    recorded : Path
-        The recording.
+    They write beside the recording, in folder `out`, under its name. No file that is there is written over. `scene` is text.
     """
 
     def __init__(self, out: Path, scene: str, lock: int) -> None:
@@ -172,18 +151,7 @@ def _free(folder: Path) -> Path:
 
 @contextmanager
 def demo_processes(out: Path, origin: str, scene: str, domain: int | None = None) -> Iterator[DemoProcesses]:
-    """Provide node and recorder within a context, isolated; recordings of earlier runs stay.
-
-    Parameters
-    ----------
-    out : Path
-    origin : str
-        Kept in the recording.
-    scene : str
-        Text of the scene that the node is given.
-    domain : int, optional
-        As for `demo.isolation.isolated`.
-    """
+    """Provide node and recorder within a context, isolated; `origin` is kept in the recording, those of earlier runs stay."""
     with isolated(domain) as isolation:
         print(isolation, file=sys.stderr)
         try:

@@ -158,18 +158,6 @@ def test_strokes_that_give_no_prediction_are_an_error_with_what_is_wrong_with_th
     assert look(403).level == Level.OK
 
 
-def test_a_boom_outside_the_models_validity_is_a_warning_as_long_as_it_is(rig: Rig, monkeypatch: Any) -> None:
-    def bent(stream: Stream, stamp: int) -> Report:
-        return Report(stamp, True, prediction=rig.prediction(), events=("deflected",))  # type: ignore[arg-type]
-
-    after(rig, 2)
-    monkeypatch.setattr(rig, "_report", bent)
-    status = rig.second((Stream.STROKES,))["model"]
-    assert status.level == Level.WARN and status.message.startswith("deflected")
-    monkeypatch.undo()
-    assert after(rig, 2)["model"].level == Level.OK
-
-
 def test_a_model_that_is_too_slow_and_clocks_that_differ(rig: Rig) -> None:
     rig.behind[Stream.ANGLES] = 0.08
     found = after(rig, 4, took=0.004)

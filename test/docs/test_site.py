@@ -47,21 +47,6 @@ def test_nothing_is_named_from_another_host(site: Path) -> None:
     assert diagrams == []  # the theme's script would fetch its renderer
 
 
-@pytest.mark.parametrize(
-    "load",
-    [
-        '<script src="https://unpkg.com/iframe-worker/shim"></script>',
-        "<img alt='' src=//a.b/c.png>",
-        '<link rel="stylesheet" href="https://fonts.googleapis.com/css">',
-        "<style>@import 'https://a.b/c.css'</style>",
-        '<p style="background: url(https://a.b/c.png)">',
-    ],
-)
-def test_the_search_for_external_loads_finds_them(tmp_path: Path, load: str) -> None:
-    (tmp_path / "page.html").write_text(f'<a href="https://a.b/">a link is fine</a>{load}')
-    assert len(external_loads(tmp_path)) == 1
-
-
 def test_every_module_has_its_place_in_the_reference(site: Path) -> None:
     pages = "".join(path.read_text(encoding="utf-8") for path in site.glob("reference/*.html"))
     for path in (ROOT / "boom_twin").rglob("*.py"):

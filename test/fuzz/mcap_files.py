@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +32,11 @@ def rewrite(
     schema_encoding: str = "ros2msg",
     change: Callable[[bytes], bytes] = bytes,
     recode: Callable[[bytes], bytes] = bytes,
+    rename: Callable[[str], str] = str,
     backwards: bool = False,
     **options: Any,
 ) -> Path:
-    """Write the messages of `source` into `target` with other options, order, definitions (`change`) or content (`recode`)."""
+    """Write the messages of `source` with other options, topics, order, definitions (`change`) or content (`recode`)."""
     options = {"chunk_size": 2048, "compression": CompressionType.NONE, **options}
     with source.open("rb") as old, target.open("wb") as new:
         writer = Writer(new, **options)
@@ -45,10 +46,27 @@ def rewrite(
         for schema, channel, message in reversed(found) if backwards else found:
             if channel.topic not in channels:
                 kind = writer.register_schema(schema.name, schema_encoding, change(schema.data))
-                channels[channel.topic] = writer.register_channel(channel.topic, encoding, kind)
+                channels[channel.topic] = writer.register_channel(rename(channel.topic), encoding, kind)
             writer.add_message(channels[channel.topic], message.log_time, recode(message.data), message.publish_time)
         writer.finish()
     return target
+
+
+Entry = tuple[str, str, str, int, bytes]  # topic, type, encoding, log time (ns), data
+
+
+def write(path: Path, entries: Iterable[Entry], name: Callable[[str], str] = str, **options: Any) -> Path:
+    """Write messages into one file, types named otherwise, definitions empty."""
+    with path.open("wb") as stream:
+        writer, channels = Writer(stream, **options), dict[tuple[str, str, str], int]()
+        writer.start(profile="ros2", library="test")
+        for topic, kind, encoding, log, data in entries:
+            if (topic, kind, encoding) not in channels:
+                schema = writer.register_schema(name(kind), "ros2msg", b"")
+                channels[topic, kind, encoding] = writer.register_channel(topic, encoding, schema)
+            writer.add_message(channels[topic, kind, encoding], log, data, log)
+        writer.finish()
+    return path
 
 
 def records(data: bytes) -> list[tuple[int, bytes]]:

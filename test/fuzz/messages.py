@@ -19,12 +19,11 @@ from default_boom import posture_angles, strokes_of_posture
 from drive_twin import drive_twin
 from numpy.random import Generator
 from recordings import sensor_message
-from ros_messages import TYPES, Output, ReportEncoder, SampleDecoder, decode, encoded, load_topics
+from ros_messages import PADDING, TYPES, Output, ReportEncoder, SampleDecoder, decode, encoded, load_topics
 
 from boom_twin import Sample, Settings, Stream, load_scene
 from boom_twin.bag.session_file import PARSE_ERRORS
 from boom_twin.messages.cdr_decoder import CdrDecoder
-from boom_twin.messages.type_store import PADDING
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import alarms, dump, layout, state

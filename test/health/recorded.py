@@ -9,41 +9,28 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from recordings import read, scan, write_session
+from recordings import write_session
+from session_readings import rows_in, samples_in
 
 from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
 from boom_twin.types import Alarm, Health
 
 NANO = 1e-9
 ARCH, PUMP = (Path(__file__).parents[2] / "bags" / name for name in ("arch_session", "pump_session"))
-TYPES = {Stream.STROKES: "JointState", Stream.ANGLES: "JointState", Stream.IMU: "Imu"}
 
 
 @lru_cache
 def session(seconds: float = 12.0, folder: Path = ARCH) -> tuple[Sample, ...]:
     """Its samples."""
-    streams, found = {stream.value: stream for stream in TYPES}, []
-    wanted = {stream.value: f"sensor_msgs/msg/{kind}" for stream, kind in TYPES.items()}
-    for topic, _, msg in read(scan(folder), wanted):
-        stream = streams[topic.lstrip("/")]
-        stamp = msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec
-        if found and (stamp - found[0].stamp) * NANO > seconds:
-            break
-        force = getattr(msg, "linear_acceleration", None)
-        values = np.array(msg.position) if force is None else np.array([force.x, force.z])
-        found.append(Sample(stream, stamp, values))
-    return tuple(found)
+    return tuple(samples_in(folder, seconds=seconds))
 
 
 def written(folder: Path, seconds: float) -> int:
     """Write them as a session with the scene of the bundled one; the number of its stroke samples."""
-    found = {stream: [sample for sample in session(seconds) if sample.stream is stream] for stream in TYPES}
-    count = min(map(len, found.values()))
-    stamps = np.array([sample.stamp for sample in found[Stream.STROKES][:count]])
-    values = [np.array([sample.values for sample in found[stream][:count]]) for stream in TYPES]
-    write_session(folder, stamps, *values, {"origin": "synthetic, the beginning of the bundled session"})
+    rows = rows_in(ARCH, seconds)
+    write_session(folder, *rows, {"origin": "synthetic, the beginning of the bundled session"})
     shutil.copy(ARCH / "session.yaml", folder)
-    return count
+    return len(rows[0])
 
 
 class Outcome(NamedTuple):

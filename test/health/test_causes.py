@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from default_boom import joint_angles_of_strokes, strokes_of_angles
 from oracle import booms
 
 from boom_twin import load_scene
 from boom_twin.health.causes import HEAD_START, MOST_GAIN, TEMPER, Evidence, Fault, hypothesis, possible_faults
 from boom_twin.health.fault_twins import FaultTwins
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_angles
 from boom_twin.texts import alarm_text
 from boom_twin.twin.blocks import SampleBlock
 from boom_twin.types import SECOND, Change, Stream

@@ -59,21 +59,9 @@ def test_begins_once_lasts_and_ends():
         assert watched.watch.alarms == () and not watched.watch.masked.any()
 
 
-def test_a_range_alarm_tells_the_offset():
-    (began,) = Watched().take(findings(1, "range", level=3.14159))
-    assert began.evidence == "an offset of +180 deg, +3.142 rad" and "zero in the mapping" in began.told
-
-
 def test_nothing_is_found_of_a_sensor_that_is_not_there():
     watch = SensorMonitor(NAMES, SENSORS[Stream.ANGLES], absent={NAMES[1]})
     assert watch.take(findings(1, "dropout"), 0, BLOCK) == [] and not watch.masked.any()
-
-
-def test_spikes_do_not_mask():
-    """Outliers are left out of means as they are."""
-    watched = Watched()
-    watched.take(findings(0, "spikes"))
-    assert len(watched.watch.alarms) == 1 and not watched.watch.masked.any()
 
 
 def test_a_jump_lasts_until_it_jumps_back():
@@ -95,14 +83,6 @@ def test_a_jump_ends_where_readings_are_right_for_two_seconds_without_a_jump_bac
     assert [alarm for _ in range(50) for alarm in watched.take(findings(), off)] == [] and watched.watch.masked[0]
     told = [alarm for _ in range(SETTLED // BLOCK + 1) for alarm in watched.take(findings(), right)]
     assert [alarm.kind for alarm in told] == ["jump"] and not watched.watch.masked.any()
-
-
-def test_jumps_of_a_wild_sensor_mean_nothing_more():
-    for kind in ("noise", "spikes"):
-        watched = Watched()
-        watched.take(findings(0, kind))
-        assert watched.take(findings(0, "jump", 0.01)) == []
-        assert [alarm.channel for alarm in watched.take(findings(1, "jump", 0.01))] == ["joint_2"]
 
 
 def test_a_frozen_sensor_that_lives_again_is_taken_back():

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from compiled import compile_scene
 from kernels.journal import Journal, bearing, memory, row
 from oracle import booms
 from oracle.clearance import drop
@@ -14,7 +15,6 @@ from oracle.clearance.scenes import RODS, with_pins
 from oracle.clearance.slider_crank import demonstration
 from scipy.integrate import solve_ivp
 
-from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.elements import pin_contact as contact
 from boom_twin.kernels.elements.pin_contact import APPROACH, CLOSED, COLUMNS, LAWS, SMOOTH, restitution_of
 from boom_twin.validation.contact_law import HYSTERESIS, Contact

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from compiled import compile_scene
 
 from boom_twin import load_scene
-from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.jit import _kind, by_reference, hold, kernel
 
 

@@ -6,14 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from compiled import compile_scene, set_undeformed, settle
 from default_boom import posture_angles, strokes_of_posture
 from kernels.dense import Dense, riccati_pass
 from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
 
 from boom_twin import load_scene
-from boom_twin.analysis.equilibrium import set_undeformed, settle
-from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.integrators import GENERALISED_ALPHA, REST, X, prepare
 from boom_twin.kernels.tables import DIGITS_LOST, NOT_CONVERGED, NOT_FINITE, OK, SINGULAR, Motion
 from boom_twin.kernels.transfer.forward_kinematics import place

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from datetime import datetime, timedelta
 from functools import cache
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
 import numpy as np
-from recordings import read, scan
+from session_readings import arrays_in
 
 from boom_twin.sensor_kinds import G
 from boom_twin.types import SECOND
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
-TOPICS = {"cylinder_strokes": "JointState", "joint_angles": "JointState", "tip_imu": "Imu"}
 BERLIN = ZoneInfo("Europe/Berlin")
 Readings = dict[str, tuple[np.ndarray, np.ndarray]]
 
@@ -23,14 +22,7 @@ Readings = dict[str, tuple[np.ndarray, np.ndarray]]
 @cache
 def readings(seconds: float) -> Readings:
     """Stamps (ns) and values (rows, channels) in SI units of each topic, from the start of the bundled session."""
-    session = scan(SESSION)
-    rows: dict[str, list[tuple[int, Sequence[float]]]] = {name: [] for name in TOPICS}
-    for name, log, msg in read(session, {name: f"sensor_msgs/msg/{kind}" for name, kind in TOPICS.items()}):
-        if log > session.start + seconds * SECOND:
-            break
-        values = (msg.linear_acceleration.x, msg.linear_acceleration.z) if name == "tip_imu" else msg.position
-        rows[name].append((msg.header.stamp.sec * SECOND + msg.header.stamp.nanosec, tuple(map(float, values))))
-    return {name: (np.array([row[0] for row in own]), np.array([row[1] for row in own])) for name, own in rows.items()}
+    return {stream.value: own for stream, own in arrays_in(SESSION, seconds).items()}
 
 
 def german(stamp: int) -> str:

@@ -23,9 +23,7 @@ OTHER_NAMES = st.text(max_size=12).filter(lambda name: not name.startswith(("joi
 
 @settings(deadline=None)
 @given(
-    values=st.lists(FINITE, min_size=1, max_size=6),
-    others=st.lists(st.tuples(OTHER_NAMES, FINITE), max_size=4),
-    data=st.data(),
+    values=st.lists(FINITE, min_size=1, max_size=6), others=st.lists(st.tuples(OTHER_NAMES, FINITE), max_size=4), data=st.data()
 )
 def test_any_order_and_extra_names(values: list[float], others: list[tuple[str, float]], data: st.DataObject) -> None:
     pairs = [(f"joint_{i}", value) for i, value in enumerate(values, 1)] + others
@@ -213,11 +211,6 @@ def test_an_encoder_a_turn_off_is_taken_modulo_a_turn_where_its_range_decides(re
     np.testing.assert_allclose(np.degrees(values), [expected, 60.0], atol=1e-9)
     inclinometer = SampleDecoder(1, mapped({"joint_1": {"absolute": "root"}}).of_joints([(-165.0, 10.0)]))
     assert cycles(inclinometer, [(1, {"joint_1": 5.0})]) == [(1, [5.0])]
-
-
-def test_a_sign_of_life_without_names_is_nothing_odd() -> None:
-    decoder = SampleDecoder(2)
-    assert decoder.samples([Stream.STROKES], 0, joint_state([], [])) == [] and not decoder.oddities and not decoder.refused
 
 
 def test_two_sources_of_one_topic_are_told_and_neither_is_used() -> None:

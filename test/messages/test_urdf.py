@@ -8,14 +8,13 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 import pytest
-from command import main
-from default_boom import examine_text, example_text, skeleton
+from default_boom import examine_text, example_text, skeleton, stroke_curve
 from drive_twin import drive_twin
 from ros_messages import Output, ReportEncoder, decoded
 
 from boom_twin import Sample, Scene, Settings, Stream, load_scene
 from boom_twin.messages.urdf import urdf
-from boom_twin.scene.kinematics import PassiveJoints, stroke_curve
+from boom_twin.scene.kinematics import PassiveJoints
 
 # What urdf.xsd of urdfdom and the wiki's page say of the elements used here: attributes, children
 # (name: fewest, most), all else refused.
@@ -183,9 +182,3 @@ def test_the_joints_lead_to_the_tip_that_is_predicted(name: str) -> None:
         np.testing.assert_allclose(poses["tip"][:3, 0], along, atol=1e-9)
         apart.append(np.linalg.norm(poses["tip"][:3, 3] - poses["tip_rigid"][:3, 3]))
     assert max(apart) > 5e-4
-
-
-def test_the_command_prints_it(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["urdf"]) == 0
-    text = capsys.readouterr().out
-    assert text == urdf(load_scene()) and text.startswith('<?xml version="1.0"?>\n<robot name="boom">\n  <!--')

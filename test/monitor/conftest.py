@@ -10,17 +10,15 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlsplit
 
-import numpy as np
 import pytest
 from drive_twin import ARCH_DRIVES, note_drives
 from made_once import MadeOnce
-from recordings import read, scan, write_session
-from ros_messages import SampleDecoder, load_topics, stamp_of
+from recordings import write_session
+from session_readings import rows_in
 
-from boom_twin import Settings, Stream, load_scene, replay
+from boom_twin import Settings, load_scene, replay
 from boom_twin.monitor.data.bag_feed import BagFeed, bag_feed
 from boom_twin.monitor.data.feed import Feed
 
@@ -36,23 +34,11 @@ def faulty(made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 def spoil(path: Path) -> None:
     """Write that session."""
-    topics, decoder = load_topics().inputs, SampleDecoder(4)
-    topics = {stream: topics[stream] for stream in (Stream.STROKES, Stream.ANGLES, Stream.IMU)}
-    values: dict[Stream, list[Any]] = {stream: [] for stream in topics}
-    names = {topic.absolute: stream for stream, topic in topics.items()}
-    stamps = []
-    for name, _, message in read(scan(ARCH_DRIVES), {topic.absolute: topic.type for topic in topics.values()}):
-        sample = decoder.put(names[name], stamp_of(message), message)
-        assert sample is not None
-        values[names[name]].append(sample.values)
-        if names[name] is Stream.STROKES:
-            stamps.append(sample.stamp)
-    stamps_ns = np.array(stamps)
+    stamps_ns, strokes, joints, imu = rows_in(ARCH_DRIVES)
     time = (stamps_ns - stamps_ns[0]) * 1e-9
     kept = (time < SECONDS) & ((time < GAP[0]) | (time > GAP[1]))
-    joints = np.array(values[Stream.ANGLES])
     joints[time >= WRONG_FROM, 2] += OFFSET
-    arrays = (np.array(values[Stream.STROKES])[kept], joints[kept], np.array(values[Stream.IMU])[kept])
+    arrays = strokes[kept], joints[kept], imu[kept]
     write_session(path, stamps_ns[kept], *arrays, {"origin": "synthetic, encoder 3 made wrong"})
     note_drives(path)
 

@@ -10,18 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 from monitor.conftest import GAP, read_all
-from recordings import SessionSheet, read, scan, write_session
+from recordings import read, scan
 from ros_messages import TYPES, Output, load_topics
 
-from boom_twin import BagError, Settings, TimeWindow, UsageError, load_scene, replay, statics
-from boom_twin.analysis.posture_modes import ModeList
-from boom_twin.monitor.data.analyst import RateList
+from boom_twin import Settings, TimeWindow, load_scene
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
-from boom_twin.monitor.data.status import Severity, overall
+from boom_twin.monitor.data.status import Severity
 from boom_twin.monitor.protocol import state
-from boom_twin.texts import alarm_text
-from boom_twin.types import StrokeReading
 
 ALL = 10**6
 
@@ -69,26 +65,6 @@ def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
     assert values == pytest.approx(np.array(expected), rel=1e-5, abs=1e-6)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("reads", [StrokeReading.LENGTH, StrokeReading.DRIVE])
-def test_the_posture_is_that_of_the_drives_whatever_transducers_read(reads: StrokeReading, tmp_path: Path) -> None:
-    """Through the twin, and from what a twin published; a result says itself what its strokes are."""
-    scene, session, stamps = load_scene(), tmp_path / "session", 10**18 + 5_000_000 * np.arange(100)
-    rest = statics(scene, "arch")
-    strokes = np.tile(rest.strokes if reads is StrokeReading.DRIVE else rest.lengths, (100, 1))
-    write_session(session, stamps, strokes, None, None, {})
-    SessionSheet("1.0", strokes=reads).write(session)
-    replay(session, scene, tmp_path / "out", health=False)
-    for source in (session, tmp_path / "out" / "bag"):
-        feed = read_all(bag_feed(source, scene, Settings()))
-        drives = feed.strokes(0.4)
-        assert drives == pytest.approx(rest.strokes, abs=1e-5)
-        assert feed.strokes_between(0.0, 0.4)[-1] == pytest.approx(drives, abs=1e-5)
-        assert ModeList(scene).at(drives) == pytest.approx(rest.frequencies, rel=2e-4)
-    found, expected = (RateList(scene).at(each).avoid for each in (drives, rest.strokes))
-    assert np.array(found) == pytest.approx(np.array(expected), abs=0.006)
-
-
 def test_alarms_are_those_of_the_summary_and_of_the_result_bag(feed: Feed, published: Feed, replayed: Path) -> None:
     summary = json.loads((replayed / "summary.json").read_text())
     (told,) = [each for each in summary["alarms"] if each["kind"] != "gap"]
@@ -103,24 +79,6 @@ def test_alarms_are_those_of_the_summary_and_of_the_result_bag(feed: Feed, publi
     gaps = [(alarm.begin, alarm.end) for alarm in feed.store.alarms.all if alarm.name == "cylinder_strokes"]
     assert gaps == [pytest.approx((each["from_s"], each["to_s"])) for each in summary["alarms"] if each["kind"] == "gap"]
     assert gaps == [pytest.approx(GAP, abs=0.02)]
-
-
-def test_the_lamps_tell_of_the_wrong_encoder_and_of_nothing_before_it(feed: Feed) -> None:
-    assert overall(feed.store.statuses(14.0).groups(14.0))[0] == Severity.OK == Severity[state(feed.store, 14.0, 14.0)["level"]]
-    level, reason = overall(feed.store.statuses(25.0).groups(25.0))
-    sentence = alarm_text("joint_3", "jump", "joint_3.sensor")  # one sentence on /diagnostics, page, summary: one alarm
-    assert level == Severity.ERROR and reason == f"health: {sentence}"
-    (alarm,) = [each for each in feed.store.alarms.all if "joint_3" in each.name]
-    assert alarm.reason == sentence and alarm.evidence.startswith("by +1.14 deg")
-
-
-def test_a_result_bag_is_shown_as_it_was_published(feed: Feed, published: Feed) -> None:
-    for name in ("displacement", "position", "acceleration", "shape", "joints", "uncertainty"):
-        rows = [each.store.tables[name].rows(0, ALL) for each in (feed, published)]
-        for ours, theirs in zip(*rows, strict=True):
-            assert np.allclose(ours, theirs, rtol=1e-6, atol=1e-12, equal_nan=True), name
-    assert published.strokes(20.0) == pytest.approx(feed.strokes(20.0)) and len(published.strokes(20.0)) == 4
-    assert overall(published.store.statuses(20.0).groups(20.0)) == (Severity.STALE, "no word from the twin")
 
 
 def test_it_is_shown_while_it_is_read(faulty: Path) -> None:
@@ -148,13 +106,3 @@ def test_a_session_that_is_damaged_is_shown_up_to_there(replayed: Path, tmp_path
     file.write_bytes(content)
     feed = read_all(bag_feed(damaged, load_scene(), Settings()))
     assert "read up to" in feed.trouble and 5.0 < feed.store.newest == feed.end < 35.0
-
-
-def test_a_session_without_anything_to_show_is_refused(faulty: Path, tmp_path: Path) -> None:
-    with pytest.raises(BagError):
-        bag_feed(tmp_path, load_scene(), Settings())
-    with pytest.raises(UsageError, match="none"):
-        bag_feed(faulty, load_scene(), Settings(), mapping=tmp_path / "none.yaml")
-    stamps = 10**18 + 5_000_000 * np.arange(100)
-    write_session(tmp_path / "far", stamps, np.full((100, 4), 50.0), np.zeros((100, 4)), np.zeros((100, 2)), {})
-    assert "no stroke could be used" in read_all(bag_feed(tmp_path / "far", load_scene(), Settings())).trouble

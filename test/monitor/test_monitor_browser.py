@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import pytest
 from eventually import eventually
-from matplotlib.image import imread
 from monitor.conftest import MonitorProcess, monitoring
 
 from boom_twin.monitor.data.feed import Feed
@@ -52,7 +51,7 @@ def opened(browser: Any, monitor: MonitorProcess, width: int, height: int, **opt
     page.on("request", lambda request: page.asked.append(request.url))
     page.on("pageerror", lambda error: page.errors.append(str(error)))
     page.goto(monitor.url)
-    wait(page, "window.twin?.timeline.isRead", 300_000)  # a page in another language reads its texts first
+    wait(page, "window.twin?.timeline.isRead", 900_000)  # a page in another language reads its texts first
     go(page, FAULT)
     return page
 
@@ -109,7 +108,7 @@ def test_the_first_glance_says_what_is_wrong_in_word_shape_and_reason(page: Any,
     wait(page, "document.querySelector('#overall .word').innerText === 'GO ON'")
 
 
-def test_figures_table_and_picture_are_those_of_the_rows_that_are_shown(page: Any, feed: Feed) -> None:
+def test_figures_and_table_are_those_of_the_rows_that_are_shown(page: Any, feed: Feed) -> None:
     names = {
         "accel. forward, m/s²": ("acceleration", 0, 1.0),
         "displ. up, mm": ("displacement", 1, 1e3),
@@ -138,42 +137,22 @@ def test_figures_table_and_picture_are_those_of_the_rows_that_are_shown(page: An
     told = [(float(row["t_s"]), float(row["acceleration_z_m_s2"])) for row in rows if row["acceleration_z_m_s2"]]
     assert np.array(told) == pytest.approx(np.stack([times, values[:, 1]], axis=1)[chosen], rel=1e-6, abs=1e-6)
     assert any(row["force_sigma_z_m_s2"] for row in rows) and any(row["joints_joint_3_normalised"] for row in rows)
-    with page.expect_download() as download:
-        page.locator("#picture").click()
-    picture = imread(download.value.path(), format="png")
-    sizes = page.evaluate("[...document.querySelectorAll('#traces canvas')].map(each => [each.width, each.height])")
-    assert picture.shape[:2] == (30 + sum(height for _, height in sizes), max(width for width, _ in sizes))
-    top = 30
-    for _, height in sizes:
-        assert len(np.unique(picture[top : top + height].reshape(-1, picture.shape[2]), axis=0)) > 20
-        top += height
 
 
-ALARM_BAR = """moments => {
-    const canvas = document.querySelector("#chart-acceleration canvas");
-    const over = document.querySelector("#chart-acceleration .u-over");
-    const [low, high] = twin.view.span, scale = canvas.width / canvas.clientWidth;
-    const at = moment => over.offsetLeft + over.clientWidth * (moment - low) / (high - low);
-    const context = canvas.getContext("2d"), y = scale * (over.offsetTop + 2);
-    return moments.map(moment => [...context.getImageData(scale * at(moment), y, 1, 1).data]) }"""
-
-
-def test_an_alarm_is_told_once_with_what_to_do_as_a_bar_and_in_the_log(page: Any, feed: Feed, replayed: Path) -> None:
+def test_an_alarm_is_told_once_with_what_to_do_and_in_the_log(page: Any, feed: Feed, replayed: Path) -> None:
     alarm = next(alarm for alarm in feed.store.alarms.all if alarm.name == "joint_3")
     gap = next(each for each in json.loads((replayed / "summary.json").read_text())["alarms"] if each["kind"] == "gap")
     height = "document.querySelector('#charts').getBoundingClientRect().height"
     before = page.evaluate(height)
 
-    def words_bars_and_marks() -> None:
+    def words_and_marks() -> None:
         assert page.locator("#overall .word").inner_text() == "LOOK"
         assert page.locator("#overall .reason").inner_text() == alarm.reason
         assert page.locator("#overall .detail").inner_text().endswith("since 15.00 s")
-        without, during = page.evaluate(ALARM_BAR, [alarm.begin - 2.0, alarm.begin + 2.0])
-        assert without[:3] != during[:3] and during[0] > 150 > during[2]
         titles = page.locator("#marks i").evaluate_all("marks => marks.map(mark => mark.title)")
         assert any(title.startswith(f"cylinder_strokes: {gap['told']} {gap['from_s']:.2f} s") for title in titles)
 
-    eventually(words_bars_and_marks)
+    eventually(words_and_marks)
     page.keyboard.press("4")
     groups = feed.store.statuses(FAULT).groups(FAULT).values()
 

@@ -40,8 +40,7 @@ def test_every_status_lights_the_lamp_of_its_group() -> None:
 
 
 @pytest.mark.parametrize(
-    ("levels", "expected"),
-    [([OK, OK], "OK"), ([OK, WARN], "WARN"), ([STALE, WARN], "STALE"), ([STALE, ERROR], "ERROR")],
+    ("levels", "expected"), [([OK, OK], "OK"), ([OK, WARN], "WARN"), ([STALE, WARN], "STALE"), ([STALE, ERROR], "ERROR")]
 )
 def test_the_worst_lamp_is_the_state_of_all(levels: list[int], expected: str) -> None:
     sensors = [status(f"n: sensor {i}", level, f"reason {i}") for i, level in enumerate(levels)]

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 from default_boom import default_text
+from recordings import TRUTH as FILE_NAME
 from recordings import MessageWriter, SessionSheet, sensor_message
-from ros_messages import jazzy
+from ros_messages import every_input, jazzy
 
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.bag.session_writer import named_message
-from boom_twin.messages.topic_table import every_input
-from boom_twin.offline.ground_truth import FILE_NAME
 from boom_twin.types import SECOND, Place
 from boom_twin.validation.rig import loads, random_programme, record
 from boom_twin.validation.rig.session import RigSession

@@ -8,7 +8,6 @@ import numpy as np
 from default_boom import anew
 from oracle import booms
 from recordings import SessionSheet, write_session
-from ruamel.yaml import YAML
 
 from boom_twin import load_scene, statics
 
@@ -44,8 +43,3 @@ def session(path: Path, text: str, *, keep: bool, rows: int = 300, bias: float =
     if keep:
         SessionSheet("0", text).write(path)
     return path
-
-
-def as_document(path: Path) -> dict[str, object]:
-    """What a ``session.yaml`` holds."""
-    return dict(YAML(typ="safe").load((path / "session.yaml").read_text()))

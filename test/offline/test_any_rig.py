@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 import yaml
+from command import main
 from offline.any_rig import DRIFT, KNOWN, LAG, TURNED, motion, write
 
 from boom_twin import replay
-from boom_twin.cli.main import main
 
 DURATION = 60.0  # s
 END = LAG + DRIFT * DURATION  # s, lag of the second IMU at the end

@@ -10,22 +10,14 @@ import numpy as np
 import pytest
 from command import main
 from offline.by_the_node import assert_same_bytes
-from recordings import load_mapping, load_truth, read, scan
-from ros_messages import SampleDecoder, load_topics, stamp_of
+from recordings import load_mapping, load_truth, write_samples
+from session_readings import samples_in
 
 from boom_twin import BagError, Sample, Stream, Twin, replay
-from boom_twin.bag.session_writer import write_samples
 from boom_twin.types import StrokeReading
 
 BAGS = Path(__file__).parents[2] / "bags"
 MOST = {"arch_session": 2e-3, "pump_session": 3e-3}  # m
-
-
-def samples_of(session: Path, streams) -> list[Sample]:
-    inputs, decoder = load_topics().inputs, SampleDecoder(4)
-    names = {inputs[stream].absolute: stream for stream in streams}
-    there = {name: inputs[stream].type for name, stream in names.items() if scan(session).find(name)}
-    return [decoder.put(names[name], stamp_of(msg), msg) for name, _, msg in read(scan(session), there)]
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +31,7 @@ def mapping(tmp_path_factory):
 def without_strokes(request, tmp_path_factory):
     folder, source = tmp_path_factory.mktemp("sessions") / request.param, BAGS / request.param
     streams = [Stream.ANGLES, Stream.IMU]
-    write_samples(folder, samples_of(source, streams), streams, {"origin": "synthetic"})
+    write_samples(folder, samples_in(source, streams), streams, {"origin": "synthetic"})
     shutil.copy(source / "truth.csv.gz", folder)
     return folder
 
@@ -79,7 +71,7 @@ def test_without_the_mapping_the_remedy_is_told(without_strokes, mapping, tmp_pa
 @pytest.mark.parametrize("factor", [180.0 / np.pi, -1.0])
 def test_angles_that_do_not_fit_are_told(factor, mapping, tmp_path):
     """A CSV file without strokes."""
-    angles = np.array([each.values for each in samples_of(BAGS / "arch_session", [Stream.ANGLES])[:400]])
+    angles = np.array([each.values for each in samples_in(BAGS / "arch_session", [Stream.ANGLES])[:400]])
     rows = np.column_stack([0.005 * np.arange(len(angles)), factor * angles])
     csv = tmp_path / "session.csv"
     np.savetxt(csv, rows, delimiter=",", header="t_s," + ",".join(f"joint_{i}_rad" for i in range(1, 5)), comments="")
@@ -90,7 +82,7 @@ def test_angles_that_do_not_fit_are_told(factor, mapping, tmp_path):
 def test_a_boom_that_strokes_do_not_drive_leaves_them_out():
     """Strokes that come all the same are counted; the zero of an angle that drives is none that a residual could give."""
     twin = Twin(reads=StrokeReading.ANGLE)
-    angles, strokes = (samples_of(BAGS / "arch_session", [stream])[:50] for stream in (Stream.ANGLES, Stream.STROKES))
+    angles, strokes = (samples_in(BAGS / "arch_session", [stream])[:50] for stream in (Stream.ANGLES, Stream.STROKES))
     for one, other in zip(angles, strokes, strict=True):
         assert twin.update(one).prediction is not None
         assert not twin.update(other).accepted
@@ -98,18 +90,10 @@ def test_a_boom_that_strokes_do_not_drive_leaves_them_out():
     assert twin.update(Sample(Stream.ANGLES, angles[-1].stamp + 5_000_000, np.full(4, np.nan))).prediction is None
 
 
-def test_check_states_the_accuracy_beside_angles(capsys):
-    assert main(["check", "--drive", "angles", "--sensors", "imu", "--json"]) == 0
-    found = capsys.readouterr().out
-    assert '"accuracy_arch:angles only"' in found and '"accuracy_arch:imu"' in found
-    assert main(["check", "--drive", "angles", "--sensors", "angles"]) == 1
-    assert "they drive the model" in capsys.readouterr().err
-
-
 def test_an_imu_elsewhere_goes_with_angles(tmp_path):
     """The readings of the tip IMU, as those of another one that the mapping places there."""
     folder, mapping = tmp_path / "session", tmp_path / "mapping.yaml"
-    samples = samples_of(BAGS / "pump_session", [Stream.ANGLES, Stream.IMU])
+    samples = samples_in(BAGS / "pump_session", [Stream.ANGLES, Stream.IMU])
     placed = [replace(each, stream=Stream.IMU_2) if each.stream is Stream.IMU else each for each in samples]
     write_samples(folder, placed, [Stream.ANGLES, Stream.IMU_2], {"origin": "synthetic"})
     shutil.copy(BAGS / "pump_session" / "truth.csv.gz", folder)

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
-from recordings import MessageWriter, SessionSheet, read, scan, write_session
+from recordings import MessageWriter, SessionSheet, write_session
 from ros_messages import fill_header, load_topics, new_message
+from session_readings import rows_in
 
 from boom_twin import Stream, UsageError, load_scene, replay
 
@@ -31,13 +32,7 @@ sensors:
 @pytest.fixture(scope="module")
 def arrays():
     """Stamps, strokes and angles of the first seconds of the bundled session."""
-    rows = {"cylinder_strokes": [], "joint_angles": []}
-    for name, _, msg in read(scan(SESSION), dict.fromkeys(rows, JOINT_STATE)):
-        rows[name].append((msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec, msg.position))
-        if min(map(len, rows.values())) == ROWS:
-            break
-    stamps, strokes = zip(*rows["cylinder_strokes"][:ROWS], strict=True)
-    return np.array(stamps), np.array(strokes), np.array([values for _, values in rows["joint_angles"][:ROWS]])
+    return tuple(each[:ROWS] for each in rows_in(SESSION, 4.0)[:3])
 
 
 @pytest.fixture(scope="module")

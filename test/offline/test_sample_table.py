@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import gzip
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -120,23 +119,6 @@ def session(tmp_path: Path) -> Path:
         tmp_path / "session", START + np.arange(400) * STEP, still, np.zeros_like(still), None, {"origin": "synthetic"}
     )
     return tmp_path / "session"
-
-
-def test_replay_writes_it_beside_the_other_results(session: Path, tmp_path: Path) -> None:
-    for _ in range(2):  # the second replaces the first
-        assert main(["replay", str(session), "--out", str(tmp_path / "out"), "--no-pictures", "--table", "csv"]) == 0
-    told = read(tmp_path / "out" / "samples.csv")
-    assert len(told["t_s"]) == 400 and np.isnan(told["measured_tip_imu_x_m_s2"]).all()
-    assert told["measured_joint_1_rad"] == pytest.approx(0.0)
-
-
-def test_parquet_without_pyarrow_is_one_clear_error(
-    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert main(["replay", str(session), "--out", str(tmp_path / "out"), "--table", "parquet"]) in (1, 2)
-    told = capsys.readouterr().err
-    assert "pip install" in told and "--table csv" in told and "preparing" not in told and not (tmp_path / "out").exists()
 
 
 def test_parquet_holds_the_same_numbers(session: Path, tmp_path: Path) -> None:

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mcap.writer import CompressionType, IndexType, Writer
+from fuzz.mcap_files import write
+from mcap.writer import CompressionType, IndexType
 from recordings import load_mapping, scan
 from ros_messages import (
     TYPES,
@@ -129,20 +130,13 @@ class Rig:
         return found
 
 
-def write(folder: Path, files: list[list[Entry]], options: list[dict[str, Any]], topics: Topics) -> None:
+def write_files(folder: Path, files: list[list[Entry]], options: list[dict[str, Any]], topics: Topics) -> None:
     """A session as bare files, with definitions left empty."""
     kinds = {topic.absolute: topic.type for topic in topics.inputs.values()} | {CHANGES: TYPES[Output.CHANGES]}
     folder.mkdir()
     for number, (entries, how) in enumerate(zip(files, options, strict=True)):
-        with (folder / f"session_{number}.mcap").open("wb") as stream:
-            writer, channels = Writer(stream, **how), dict[str, int]()
-            writer.start(profile="ros2", library="test")
-            for log, name, data in entries:
-                if name not in channels:
-                    schema = writer.register_schema(kinds.get(name, "other_msgs/msg/Other"), "ros2msg", b"")
-                    channels[name] = writer.register_channel(name, "cdr", schema)
-                writer.add_message(channels[name], log, data, log)
-            writer.finish()
+        rows = ((name, kinds.get(name, "other_msgs/msg/Other"), "cdr", log, data) for log, name, data in entries)
+        write(folder / f"session_{number}.mcap", rows, **how)
 
 
 Found = list[tuple[Any, ...] | Change]
@@ -225,7 +219,7 @@ def test_a_session_of_any_layouts_is_read_as_one_message_after_the_other(tmp_pat
     rig = Rig(random, 0.001 if is_calm else float(random.choice([0.0, 0.01, 0.2])), is_calm)
     count = int(random.integers(1, 4))
     files = rig.session(topics, count, rows=int(random.choice([30, 400])))
-    write(tmp_path / "bag", files, [FILES[random.integers(len(FILES))] for _ in range(count)], topics)
+    write_files(tmp_path / "bag", files, [FILES[random.integers(len(FILES))] for _ in range(count)], topics)
     expected = Expected(tmp_path / "bag", files, topics)
     assert any(isinstance(each, tuple) for each in expected.found) and not expected.error
     compare(tmp_path / "bag", topics, expected)
@@ -244,6 +238,6 @@ def test_a_message_that_cannot_be_decoded_is_told_as_the_first_one(tmp_path: Pat
             continue
         bad = [data[: random.integers(len(data))], data + bytes(20), data[:16] + b"\xff" * 4 + data[20:], b"\7\7" + data[2:]]
         entries[place] = (log, name, bad[random.integers(len(bad))])
-    write(tmp_path / "bag", files, [FILES[random.integers(len(FILES))] for _ in range(2)], topics)
+    write_files(tmp_path / "bag", files, [FILES[random.integers(len(FILES))] for _ in range(2)], topics)
     expected = Expected(tmp_path / "bag", files, topics)
     compare(tmp_path / "bag", topics, expected)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 
 import numpy as np
 import pytest
@@ -11,16 +10,14 @@ from command import main
 from default_boom import default_text
 from drive_twin import note_drives
 from offline.booms_apart import scene_text, session
-from recordings import MessageWriter, SessionSheet, scan, scene_of
+from recordings import SHEET as FILE_NAME
+from recordings import MessageWriter, SessionSheet, scene_of
 from ros_messages import fill_header, load_topics, new_message
 
 from boom_twin import BagError, Settings, Stream, load_scene, replay
-from boom_twin.bag.session_model import FILE_NAME, sha256
-from boom_twin.cli.output import warn_incomplete
+from boom_twin.bag.session_model import sha256
 from boom_twin.monitor.data.bag_feed import bag_feed
-from boom_twin.offline.inputs import OtherBoom
 from boom_twin.scene.load import DEFAULT_NAME
-from boom_twin.types import Alarm, Health
 
 FAULTY = "sections: []\n"
 
@@ -147,38 +144,9 @@ def test_a_broken_scene_in_a_session_is_one_line_with_the_remedy(text, words, tm
         assert words in told and "Give the scene by --scene." in told and told.count("\n") == 1
 
 
-NO_SHEETS = ["- 1\n", "scene: {sections: []}\n", "scene: [1]\n", "scene: 3\n", "a: [\n", "scene: !x y\n"]
-
-
-@pytest.mark.parametrize("document", NO_SHEETS)
-def test_what_is_no_sheet_is_one_line_with_the_remedy(document, tmp_path):
-    (tmp_path / FILE_NAME).write_text(document)
-    with pytest.raises(BagError, match=r"session\.yaml.*by --scene"):
-        scene_of(tmp_path)
-
-
 def test_a_scene_that_was_changed_is_told(five, tmp_path, capsys):
     bag = without_scene(five, tmp_path / "bag")
     sheet = (five / FILE_NAME).read_text()
     (bag / FILE_NAME).write_text(sheet.replace("gravity", "# by hand\n  gravity", 1) + "baseline: of 0.1.0\n")
     assert main(["info", str(bag)]) == 0
     assert "was changed since the session was made" in capsys.readouterr().err
-
-
-def test_what_never_reached_the_recorder_is_told(four, tmp_path, capsys):
-    session = tmp_path / "session"
-    shutil.copytree(four, session)
-    counts = [{"topic": "/cylinder_strokes", "received": 8, "written": 8, "missed": 3}, {"topic": "/tip_imu", "missed": None}]
-    SessionSheet("0").write(session, counts)
-    warn_incomplete(scan(session))
-    assert "never reached the recorder: 3 of /cylinder_strokes." in capsys.readouterr().err
-
-
-def test_angles_of_another_boom_are_told_unless_their_wiring_explains_them():
-    right = np.array([1.04, -0.72, -0.88, -0.87]) + 1e-4 * np.random.default_rng(2).normal(size=(20, 4))
-    wired = Health(1, (Alarm("joint_1", "wiring", 0, None, "joint_1.sensor", "in degrees"),), np.zeros(2))
-    for health, is_told in ((None, True), (wired, False)):
-        judge = OtherBoom()
-        judge.hear(health)
-        judge.take(1, 3.0 * right, 2.0 * right)
-        assert judge.judge().startswith("joint_1 by ") == is_told

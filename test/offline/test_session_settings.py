@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from recordings import SHEET as FILE_NAME
 from recordings import SessionSheet
 
 from boom_twin import BagError, Settings, UsageError
-from boom_twin.bag.session_model import FILE_NAME, settings_of
+from boom_twin.bag.session_model import settings_of
 from boom_twin.cli.output import open_session_settings
 from boom_twin.config.settings import Thresholds, load_thresholds
 
@@ -72,8 +73,6 @@ def test_a_parameter_file_is_resolved_as_by_the_node(kind, tmp_path):
             "front: {boom_twin: {ros__parameters: {payload: 40.0}}}",
             r"no parameters of /boom_twin, only of /front/boom_twin\. Name",
         ),
-        ("ros__parameters: {payload: 40.0}", "not a ROS parameter file"),
-        ("boom_twin: {payload: 40.0}", "not a ROS parameter file"),
         ("boom_twin: {ros__parameters: [payload]}", "not a ROS parameter file"),
         ("boom_twin: {ros__parameters: {pay: {load: 40.0}}}", r"pay\.load = 40\.0: unknown\. The nearest is `payload`"),
     ],

@@ -16,16 +16,7 @@ from .segments import Segments, cylinder_forces, equilibrium
 
 
 class Lagrange:
-    """Equations of motion of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    drive : callable
-        Of time: lengths, rates, accelerations of the drives, each (n,).
-    fineness : int
-        See `Segments`.
-    """
+    """Equations of motion of a scene; `drive`: time -> lengths, rates, accelerations, each (n,); `fineness`: see `Segments`."""
 
     def __init__(self, scene, drive, fineness=0):
         self.scene, self.drive, self.model = scene, drive, Segments(scene, fineness)

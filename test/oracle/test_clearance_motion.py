@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from compiled import compile_scene
 from default_boom import strokes_of_posture
 from oracle.clearance import rigid
 from oracle.clearance.scenes import RODS, with_pins
@@ -13,7 +14,6 @@ from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
 
 from boom_twin.analysis.methods import integrate_with
-from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.elements.pin_contact import SMOOTH
 from boom_twin.validation.contact_law import HYSTERESIS, Contact
 

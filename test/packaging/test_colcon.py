@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -19,8 +19,6 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not COLCON.exists(), reason="no colcon in .venv-colcon; make test-extra installs it"),
 ]
-
-Command = Callable[..., str]
 
 
 def environment() -> dict[str, str]:

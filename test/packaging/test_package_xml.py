@@ -66,11 +66,6 @@ def test_everything_of_ros_that_is_used_is_named() -> None:
     assert used - NOT_OF_ROS - ON_REQUEST <= named and not ON_REQUEST & named
 
 
-def test_names_are_in_order() -> None:
-    names = [str(each.text) for each in PACKAGE.findall("exec_depend")]
-    assert names == sorted(set(names))
-
-
 def test_no_module_hides_a_function_of_the_package():
     """Importing every module first must leave the public names what they are."""
     program = (

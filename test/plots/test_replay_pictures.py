@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from boom_twin.plots import History, ImuTrace, Truth, replay_pictures, session
-from boom_twin.plots.residuals import density
+from boom_twin.plots import History, ImuTrace, replay_pictures
 from boom_twin.types import Array
 
 ALL = ["tip.png", "residuals.png", "posture.png", "spectrum.png"]
@@ -91,18 +88,3 @@ def test_what_is_not_there_has_no_picture(tmp_path: Path) -> None:
     told = history(2, imu=False)
     bare = replace(told, residual_names=(), residual_values=nothing, residual_sigmas=nothing, residual_means=nothing, shapes=[])
     assert [path.name for path in replay_pictures(tmp_path, bare)] == ["tip.png", "spectrum.png"]
-
-
-def test_a_spectrum_has_the_power_of_its_sine() -> None:
-    t = np.arange(0.0, 20.0, 0.005)
-    found = density(t, 3.0 * np.sin(2.0 * np.pi * 5.0 * t))
-    assert found.frequencies[np.argmax(found.power)] == pytest.approx(5.0, abs=0.13)
-    assert np.sum(found.power) * found.frequencies[0] == pytest.approx(4.5, rel=0.02)  # half of the amplitude squared
-
-
-def test_the_title_tells_the_error_against_the_truth(tmp_path: Path, figures_of: Callable[..., list[Any]]) -> None:
-    figures, told = figures_of(session), history(2, seconds=3.0)
-    truth = Truth(told.stamps_s, told.tip_position + np.array([0.03, 0.04]), told.tip_acceleration)
-    session.tip_picture(tmp_path / "tip.png", "test", told, truth, "")
-    titles = [axes.get_title(loc="left") for axes in figures[0].axes]
-    assert titles[0].endswith("rms error: prediction 50 mm") and titles[1].endswith("rms error: prediction 0 m/s²")

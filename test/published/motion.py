@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from compiled import RHO, Plan, compile_scene, set_undeformed, taken_apart, width_of
 
 from boom_twin.analysis.drive import PASSES
-from boom_twin.analysis.equilibrium import set_undeformed
-from boom_twin.analysis.simulate import RHO
-from boom_twin.compiler.compile import compile_scene
-from boom_twin.compiler.plan import Plan, taken_apart, width_of
 from boom_twin.kernels.integrators import DEPTH, GENERALISED_ALPHA, HAT, NEW_A, A, P, Scheme, X, new_weights
 from boom_twin.kernels.tables import State, Work
 from boom_twin.kernels.transfer.forward_kinematics import place

@@ -8,22 +8,16 @@ import numpy as np
 import pytest
 from command import main
 from drive_twin import ARCH_DRIVES, note_drives
-from health.recorded import session
 from made_once import MadeOnce
 from recordings import write_session
-
-from boom_twin import Stream
+from session_readings import rows_in
 
 SECONDS, WRONG_FROM, WRONG_BY = 24.0, 12.0, 0.0035
 
 
 def write_sessions(folder: Path) -> None:
     """``healthy`` and ``faulty`` into a folder; all streams have the same stamps."""
-    streams = Stream.STROKES, Stream.ANGLES, Stream.IMU
-    found = [[each for each in session(SECONDS, ARCH_DRIVES) if each.stream is stream] for stream in streams]
-    count = min(map(len, found))
-    stamps = np.array([each.stamp for each in found[0][:count]])
-    strokes, joints, imu = (np.array([each.values for each in rows[:count]]) for rows in found)
+    stamps, strokes, joints, imu = rows_in(ARCH_DRIVES, SECONDS)
     notes = {"origin": "synthetic session <of a test> & more"}
     write_session(folder / "healthy", stamps, strokes, joints, imu, notes)
     wrong = joints + WRONG_BY * np.array([0.0, 0.0, 1.0, 0.0]) * (stamps - stamps[0] > WRONG_FROM * 1e9)[:, None]

@@ -51,14 +51,3 @@ def test_what_is_no_session_and_no_whole_replay_is_refused(tmp_path: Path, capsy
     (tmp_path / "summary.json").write_text("{}")
     assert main(["compare", str(tmp_path), str(tmp_path)]) == 1
     assert "Replay the session again" in capsys.readouterr().err
-
-
-def test_a_window_is_that_of_the_sessions_and_refused_for_a_replay(
-    sessions: tuple[Path, Path], replays: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
-    window = ["--start", "1", "--duration", "1"]
-    assert main(["compare", *map(str, sessions), *window, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["name"] and set(found["difference"]) == {0.0}, "the fault begins later"
-    assert main(["compare", *map(str, replays), *window]) == 1
-    assert "a replay folder has its own window" in capsys.readouterr().err

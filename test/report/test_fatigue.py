@@ -7,7 +7,6 @@ import pytest
 import rainflow
 from command import main
 
-from boom_twin import UsageError
 from boom_twin.report.fatigue import RainflowCounter, damage_of, endured
 
 MPA = 1e6
@@ -63,12 +62,6 @@ def test_a_sine_does_the_damage_of_its_cycles():
     assert endured(np.array([71.0 * MPA]), 71.0)[0] == pytest.approx(2e6)
     knee = 71.0 * MPA * 0.4 ** (1 / 3)
     assert endured(np.array([knee * (1 + 1e-9), knee * (1 - 1e-9)]), 71.0) == pytest.approx(5e6, rel=1e-6)
-
-
-def test_without_the_package_it_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "rainflow", None)
-    with pytest.raises(UsageError, match=r"boom_twin\[fatigue\]"):
-        RainflowCounter()
 
 
 def test_the_report_has_the_fatigue_of_all_stations(replays, tmp_path, capsys):

@@ -18,7 +18,6 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
-from demo import isolation as module
 from demo.isolation import Isolation
 from eventually import eventually
 from recordings import scan
@@ -112,22 +111,3 @@ def test_a_rig_in_the_same_domain_neither_feeds_nor_is_fed(isolation: Isolation,
     node.destroy_node()
     assert set(heard) == {"isolated"}
     assert "fed by" not in (tmp_path / "rig").read_text()
-
-
-def test_a_demonstration_refuses_a_domain_in_use(
-    isolation: Isolation, bag: Path, spawn: Callable[..., Any], demo_path: None, tmp_path: Path
-) -> None:
-    with rig_in(free := unclaimed(), tmp_path / "rig"):
-        process = spawn("demo.demo", "--bag", str(bag), "--out", str(tmp_path / "out"), "--domain", str(free))
-        assert process.end() == 1
-    assert f"ROS domain {free} is in use" in process.said() and "Traceback" not in process.said()
-    assert "/some_rig" in process.said() or "a node without a known name" in process.said()
-    assert f"publishes /{TOPIC}" in process.said() or f"listens to /{TOPIC}" in process.said()
-    assert not (tmp_path / "out").exists()
-
-
-def unclaimed() -> int:
-    """A domain that nobody has claimed a moment ago."""
-    claimed, lock = module._claim(module._preferred())
-    lock.close()
-    return claimed

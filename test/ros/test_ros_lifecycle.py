@@ -114,13 +114,3 @@ def test_a_node_that_compiles_answers_and_ends(
     rig.until(lambda: float(rig.values("model")["preparing_s"]) > before + 0.5)
     assert node.stop(signal.SIGINT) == 0 and "stopping" in node.said(), node.said()
     assert not any(word in node.said() for word in ("Traceback", "FATAL", "model ready")), node.said()
-
-
-def test_a_model_that_cannot_be_prepared_ends_the_node(
-    spawn_node: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / ".numba_config.yaml").touch()
-    monkeypatch.chdir(tmp_path)
-    node = spawn_node()
-    assert node.end() == 1
-    assert "preparing the model" in node.said() and "would change how the model is compiled" in node.said(), node.said()

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from ros_messages import PADDING
 
 pytest.importorskip("rclpy")
 
@@ -15,7 +16,6 @@ from ros_rig import joint_state
 from sensor_msgs.msg import Imu
 
 from boom_twin import Stream
-from boom_twin.messages.type_store import PADDING
 from boom_twin.types import SECOND
 
 NAN, INF = float("nan"), float("inf")

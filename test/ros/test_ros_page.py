@@ -16,7 +16,6 @@ import pytest
 pytest.importorskip("rclpy")
 pytest.importorskip("aiohttp")
 
-from default_boom import default_text
 from eventually import eventually
 from hostile import Trap
 from lifecycle_msgs.msg import Transition
@@ -57,22 +56,6 @@ def test_a_killed_page_changes_nothing_and_another_comes_and_goes_with_the_confi
     gone(page)
     assert remote.set("monitor", False).successful and remote.change(Transition.TRANSITION_CONFIGURE)
     assert not watched.children and watched.said().count("the monitor ended") == 1 and watched.stop() == 0
-
-
-def test_the_page_hears_a_node_under_other_names_and_ends_even_if_that_is_killed(
-    spawn_node: Callable[..., Any], tmp_path: Path
-) -> None:
-    scene = tmp_path / "scene.yaml"
-    scene.write_text(default_text())
-    node = spawn_node("-p", "monitor:=true", "-p", f"scene:={scene}", "-r", "__ns:=/crane", "-r", "tip_imu:=/rig/imu")
-    node.wait_for("open http")
-    (page,) = node.children
-    arguments = Path(f"/proc/{page}/cmdline").read_text().split("\0")
-    assert "__ns:=/crane" in arguments and "/crane/tip_imu:=/rig/imu" in arguments, arguments
-    assert arguments[arguments.index("--scene") + 1] == str(scene)  # it opens none that a message names
-    assert not any("/diagnostics" in each for each in arguments)
-    node.stop(signal.SIGKILL)
-    gone(page)
 
 
 PROFILES = """<?xml version="1.0" encoding="UTF-8" ?>

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import pty
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +15,6 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
-from command import main
 from recordings import scan
 from ros_messages import stamp_of
 from ros_rig import all_stored, spin_until
@@ -105,37 +102,6 @@ def test_again_and_again_until_it_is_stopped(spawn: Callable[..., Any], listener
     spin_until(listener, lambda: len(came) > 850)
     assert play.stop(signal.SIGINT) == 0
     assert "s: /tip_imu " in play.said() and "sent in" in play.said()
-
-
-def test_the_space_bar_pauses(spawn: Callable[..., Any], bag: Path) -> None:
-    ours, theirs = pty.openpty()
-    play = spawn(*PLAY, str(bag), "--wait", "0", "--rate", "2", stdin=theirs)
-    play.wait_for("space: pause")
-    play.wait_for("playing")
-    os.write(ours, b"x ")
-    play.wait_for("paused")
-    os.write(ours, b" ")
-    assert play.end() == 0, play.said()
-    assert "s: cylinder_strokes 800, joint_angles 800, tip_imu 800; at worst" in play.said()
-    os.close(ours)
-    os.close(theirs)
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--wait", "0.5"], "boom_twin play: nobody listened within 0.5 s"),
-        (["--wait", "0", "--start", "10"], "nothing from 10 s on; the session lasts 4.0 s"),
-        (["--wait", "0", "--topics", "tip_imo"], "no topic tip_imo"),
-    ],
-)
-def test_what_cannot_be_played(
-    bag: Path, domain: None, capsys: pytest.CaptureFixture[str], options: list[str], words: str
-) -> None:
-    rclpy.try_shutdown()
-    code = main(["play", str(bag), *options])
-    rclpy.init(args=[])
-    assert code == 1 and words in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("with_metadata", [True, False])

@@ -15,7 +15,6 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
-from command import main
 from rcl_interfaces.msg import ParameterEvent
 from recordings import read, recover, scan
 from ros_rig import Rig, joint_state
@@ -73,11 +72,7 @@ def received(rig: Rig, topic: str) -> float:
 
 def test_any_topics_with_a_sheet_and_splits(spawn: Callable[..., Any], new_rig: Callable[..., Rig], tmp_path: Path) -> None:
     out, rig = tmp_path / "bag", new_rig()
-    with (
-        Source("odd_strokes", JointState, strokes),
-        Source("/odd", ParameterEvent, odd),
-        Source("/other", ParameterEvent, odd),
-    ):
+    with Source("odd_strokes", JointState, strokes), Source("/odd", ParameterEvent, odd), Source("/other", ParameterEvent, odd):
         topics = ["odd_strokes", "/odd", "/never:std_msgs/String", "/other:sensor_msgs/JointState"]
         options = ["--split-duration", "0.5", "--note", "wind: 5 m/s\nx", "--origin", "a test"]
         record = spawn("boom_twin.cli.main", "record", "--out", str(out), "--topics", *topics, *options)
@@ -164,36 +159,3 @@ def test_a_killed_recorder_loses_little(
     assert saved == list(range(saved[0], saved[0] + len(saved)))
     assert outcome.saved.total() == len(saved) >= told
     assert outcome.lost is None or not any(outcome.lost.values())
-
-
-def test_nothing_to_record(spawn: Callable[..., Any], tmp_path: Path) -> None:
-    record = spawn("boom_twin.cli.main", "record", "--out", str(tmp_path / "bag"), "--duration", "0.5")
-    assert record.end() == 1 and "nothing came" in record.said()
-    assert (tmp_path / "bag" / "metadata.yaml").is_file()
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--topics", "/a:no_such_msgs/msg/Thing"], "not an installed message type"),
-        (["--topics", "/a", "a"], "topic /a is named twice"),
-        (["--split-size", "10"], "must be at least 1M"),
-    ],
-)
-def test_refused_at_once(options: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    try:
-        code = main(["record", "--out", str(tmp_path / "bag"), *options])
-    except SystemExit as end:
-        code = int(end.code or 0)
-    assert code in (1, 2) and words in capsys.readouterr().err
-    assert not (tmp_path / "bag").exists()
-
-
-@pytest.mark.parametrize("inner", ["", "bag", "bag/today"])
-def test_nothing_is_recorded_into_what_was_left(inner: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    left = tmp_path / "out.unfinished"
-    left.mkdir()
-    (left / "unfinished.json").write_text('{"command": "replay"}')
-    assert main(["record", "--out", str(left / inner), "--duration", "0.1"]) == 1
-    assert "lies in an unfinished result" in capsys.readouterr().err
-    assert [entry.name for entry in left.iterdir()] == ["unfinished.json"]

@@ -89,10 +89,7 @@ def test_a_bad_argument_is_told_by_its_name(
 @pytest.mark.parametrize(
     ("environment", "told"),
     [
-        (
-            {"RMW_IMPLEMENTATION": "rmw_none"},
-            "=rmw_none: rclpy cannot load this middleware. Install its package,",
-        ),
+        ({"RMW_IMPLEMENTATION": "rmw_none"}, "=rmw_none: rclpy cannot load this middleware. Install its package,"),
         ({"ROS_DOMAIN_ID": "one"}, "ROS_DOMAIN_ID is not an integral number. Check the environment variables ROS_*."),
     ],
 )

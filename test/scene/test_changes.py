@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from default_boom import default_text, parameter, with_parameters
+from default_boom import default_text, parameter, parameter_names, with_parameters
 from drive_twin import drive_twin
 from oracle import booms
 from scene.editing import DEFAULT
 
 from boom_twin import SceneError, UsageError, load_scene, simulate, statics
-from boom_twin.scene.edit import parameter_names
 
 SCENE = load_scene()
 ELASTIC = booms.on_elastic_base(SCENE, 5.0e6, 5.0e4)

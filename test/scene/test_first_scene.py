@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from default_boom import examine
+from default_boom import examine, stroke_curve
 
 from boom_twin import Scene, SceneError
 from boom_twin.scene.boom_table import read_table
 from boom_twin.scene.first_scene import first_scene
-from boom_twin.scene.kinematics import stroke_curve
 from boom_twin.scene.oil_spring import middle_stiffness
 
 EXAMPLE = (files("boom_twin") / "msg_config" / "boom_table.yaml").read_text(encoding="utf-8")
@@ -86,19 +85,6 @@ def test_a_fault_of_the_table_names_its_line(tmp_path: Path, old: str, new: str,
     assert path.rpartition(".")[2] in line or "- {kind: B1" in line or "material:" in line
 
 
-def test_a_joint_that_cannot_do_its_range_is_refused_with_the_range_that_it_can_do(tmp_path: Path) -> None:
-    old = "range_deg: [-165, 10], bore: 200 mm"
-    assert EXAMPLE.count(old) == 1
-    with pytest.raises(SceneError) as caught:
-        scene_of(tmp_path, EXAMPLE.replace(old, "range_deg: [-200, 10], bore: 200 mm"))
-    (fault,) = caught.value.faults  # and none of postures, which the table does not name
-    assert fault.path == "joints[1].range_deg"
-    assert (fault.line or 0) == EXAMPLE[: EXAMPLE.index(old)].count("\n") + 1
-    assert "do not meet at -200.0 to" in fault.bound or "turns back at" in fault.bound
-    low = float(fault.remedy.partition("[")[2].partition(",")[0])
-    scene_of(tmp_path, EXAMPLE.replace(old, f"range_deg: [{low}, 10], bore: 200 mm"))  # is not refused
-
-
 SLIPS = [
     ("wall: 8 mm", "wall: 8 cm", "sections[0].wall", "with walls of 8"),
     ("bore: 200 mm, rod: 120 mm", "bore: 100 mm, rod: 60 mm", "joints[1].bore", "not radii"),
@@ -125,14 +111,3 @@ def test_a_slip_in_the_table_is_warned_of_where_it_is(tmp_path: Path, old: str, 
     oddities = scene_of(tmp_path, EXAMPLE.replace(old, new))[2]
     told = [str(oddity) for oddity in oddities if oddity.path == path]
     assert len(told) == 1 and words in told[0] and len(oddities) <= 4, [str(oddity) for oddity in oddities]
-
-
-def test_an_inclination_without_unit_and_a_pipe_of_some_sections_are_refused(tmp_path: Path) -> None:
-    tilted = EXAMPLE.replace("-2750 mm]}", "-2750 mm], inclination: 3}", 1)
-    with pytest.raises(SceneError, match=r"inclination = 3: rad or degrees\?.*3 deg or 3 rad"):
-        scene_of(tmp_path, tilted)
-    _, scene, _ = scene_of(tmp_path, tilted.replace("inclination: 3", "inclination: 3 deg"))
-    assert scene.base.inclination == pytest.approx(math.radians(3.0))
-    some = EXAMPLE.replace("pipe: 25 kg/m", "", 1).replace("wall: 8 mm", "wall: 8 mm, pipe: 25 kg/m", 1)
-    with pytest.raises(SceneError, match=r"sections\[2\]\.pipe is absent: other sections have 25"):
-        scene_of(tmp_path, some)

@@ -7,11 +7,10 @@ from typing import Any
 
 import pytest
 from command import main
-from default_boom import clearance_text, default_text, example_text, with_end_mark
+from default_boom import clearance_text, default_text, example_names, example_text, with_end_mark
 from scene.editing import OIL, example, put
 
 from boom_twin import SceneError, load_scene
-from boom_twin.scene.load import example_names
 from boom_twin.scene.summary import explain
 
 # Each row: the place that is edited and, if it is another one, the place of the warning; the new value; words of the message.
@@ -209,13 +208,3 @@ def test_sound_scenes_have_no_warning(bench: Any) -> None:
     loaded = with_end_mark(f"{default_text()}\nline_fill: 20.0\ntip: {{payload: 40.0}}")
     for text in (default_text(), clearance, whole, loaded, *map(example_text, example_names())):
         assert main(["check", "--strict", str(bench.text(text))]) == 0
-
-
-def test_strict_makes_warnings_errors(bench: Any, capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(bench.edited(lambda values: values["joints"][0]["cylinder"].update(k=40e3)))
-    assert main(["check", path]) == 0
-    assert "Warnings: 1" in capsys.readouterr().out
-    picture = Path(path).with_name("pins.png")  # it shows what the warnings are about
-    assert main(["check", path, "--strict", "--picture", str(picture)]) == 1 and picture.is_file()
-    out, err = capsys.readouterr()
-    assert out == "" and "1 fault" in err and "joints[0].cylinder.k = 40000.0" in err

@@ -13,7 +13,7 @@ from boom_twin import load_scene
 def main(argv: Sequence[str] | None = None) -> None:
     """Write the report, the numbers and the pictures of a study."""
     parser = ArgumentParser(prog="python -m studies", description=__doc__)
-    parser.add_argument("kind", choices=("papers", "clearance", "roundoff"))
+    parser.add_argument("kind", choices=("papers", "clearance"))
     parser.add_argument("--out", required=True, type=Path, help="folder; files of this study in it are replaced")
     parser.add_argument("--quick", action="store_true", help="few cases on a short motion")
     args = parser.parse_args(argv)

@@ -18,12 +18,7 @@ RAMP, STOP = 0.3, 1.0  # s, until full speed; begin of braking
 class StopMotion:
     """Strokes that reach full speed within `ramp`, brake from `stop` on within `brake` (s), and hold. n cylinders.
 
-    Attributes
-    ----------
-    angles : ndarray, shape (n,)
-        Joint angles (rad) of the undeformed boom at the start.
-    first, speed : ndarray, shape (n,)
-        Strokes at the start, m; full speed, m/s.
+    From joint `angles` (rad) of the undeformed boom; `first` strokes (m) and full `speed` (m/s), each (n,).
     """
 
     angles: np.ndarray

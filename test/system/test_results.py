@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from recordings import incompleteness
 
 from boom_twin import BagError
-from boom_twin.bag.session_model import incompleteness
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.system.result_folder import RECOVER, REPLAY, RIG, ResultKind, result_folder
 

@@ -9,7 +9,7 @@ import pytest
 from convergence.balances import states_of
 from default_boom import strokes_of_posture
 from drive_twin import drive_twin
-from recordings import read, scan
+from session_readings import samples_in
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene
 from boom_twin.analysis.simulate import course_of
@@ -72,14 +72,11 @@ def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene, mount):
     noise = np.random.default_rng(5).normal(0.0, Settings().angle_sigma, len(truth))
     twin, found = Twin(scene, Settings(), [None, None, None, mount]), []
     rows = 4000
-    for row, (_, _, msg) in zip(
-        range(rows), read(scan(ARCH), {"cylinder_strokes": "sensor_msgs/msg/JointState"}), strict=False
-    ):
-        stamp = msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec
-        twin.update(Sample(Stream.STROKES, stamp, msg.position))
+    for row, sample in enumerate(samples_in(ARCH, [Stream.STROKES])[:rows]):
+        twin.update(sample)
         angles = np.full(4, np.nan)
         angles[3] = read_angles[row] + noise[row]
-        found += [residuals.normalised[3] for residuals in twin.update(Sample(Stream.ANGLES, stamp, angles)).residuals]
+        found += [residuals.normalised[3] for residuals in twin.update(Sample(Stream.ANGLES, sample.stamp, angles)).residuals]
     assert len(found) == rows
     least = 0.2 if mount == "head" else 0.6  # a share of the error by acceleration is stated as not known
     assert abs(np.mean(found)) < 0.3 and least < np.std(found) < 1.15

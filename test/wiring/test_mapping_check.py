@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 import yaml
 from command import main
-from recordings import read, scan, write_session
+from recordings import write_session
+from session_readings import rows_in
 
 from boom_twin import Stream
 
@@ -31,13 +32,7 @@ class Rows(NamedTuple):
 
 @pytest.fixture(scope="module")
 def rows() -> Rows:
-    found: dict[str, list[Any]] = {stream.value: [] for stream in (Stream.STROKES, Stream.ANGLES, Stream.IMU)}
-    kinds = {"tip_imu": "sensor_msgs/msg/Imu"}
-    types = {name: kinds.get(name, "sensor_msgs/msg/JointState") for name in found}
-    for name, _, msg in read(scan(BAGS / "arch_session"), types):
-        force = getattr(msg, "linear_acceleration", None)
-        found[name].append(msg.position if force is None else (force.x, force.z))
-    strokes, joints, imu = (np.array(each)[::4] for each in found.values())
+    strokes, joints, imu = (each[::4] for each in rows_in(BAGS / "arch_session")[1:])
     return Rows(10**18 + 20_000_000 * np.arange(len(strokes)), strokes, joints, imu)
 
 

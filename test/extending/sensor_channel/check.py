@@ -7,9 +7,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
 
-from boom_twin import Sample, Settings, Stream, Twin, load_scene, replay
+from boom_twin import Sample, Settings, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_writer import write_samples
 from boom_twin.calibration.run import judged
@@ -23,8 +22,6 @@ from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.protocol import layout
-from boom_twin.offline.history import HistoryBuilder
-from boom_twin.plots.residuals import residual_picture
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import default_text
 from boom_twin.types import StrokeReading, channels_of
@@ -84,16 +81,10 @@ kept = read(scan(Path("result/bag")), {"/boom_twin/residuals": "sensor_msgs/msg/
 kept = [message.position[0] for _, _, message in kept if message.name == [CHANNEL]]
 assert len(kept) == count and np.abs(np.array(kept) - WRONG).max() < 6e-4
 
-# In pictures, report and comparisons, with its unit.
+# In report and comparisons, with its unit.
 rows = json.loads(Path("result/quantities.json").read_text())["quantities"]
 mean = next(row for row in rows if row["name"] == f"residual_mean_{CHANNEL}")
 assert math.isclose(mean["value"], WRONG, abs_tol=5e-4) and mean["unit"] == "rad" and mean["sigma"] is None
-labels, set_ylabel = [], Axes.set_ylabel
-Axes.set_ylabel = lambda self, text: labels.append(text) or set_ylabel(self, text)
-recording = replay("session", load_scene("scene.yaml"), "again", health=False).recording
-residual_picture(Path("residuals.png"), "session", HistoryBuilder(scene).add(recording.whole), "")
-assert f"{CHANNEL}\nrad" in labels and "joint_1\nmrad" in labels
-
 # On the live page: a table of residuals, from which it makes chart, figures and columns of the export.
 feed = bag_feed(Path("session"), scene, Settings())
 while feed.is_reading:

@@ -18,12 +18,7 @@ def lengthening(contact, force, axis):
 def tip_shift(document, headings, index, contact, force):
     """Complex, m: the resting tip with play in cylinder `index` (0-based) minus the one with an ideal pin.
 
-    Parameters
-    ----------
-    headings : sequence of float
-        rad, of the sections where the boom rests with an ideal pin, sag included: levers change with it.
-    force : complex
-        N, of the bush on the rod's pin, there.
+    `headings` (rad) of the sections at rest with an ideal pin, sag included; there the bush pushes the pin with `force` (N).
     """
     barrel, rod = pins(document, headings, index)
     return levers(document, headings)[index] * lengthening(contact, force, rod - barrel)

@@ -36,17 +36,9 @@ def energy(model: Segments, boom: SegmentBoom, drive: np.ndarray) -> tuple[Jet, 
 def equilibrium(
     model: Segments, drive: np.ndarray, angles: np.ndarray
 ) -> tuple[np.ndarray, SegmentBoom, np.ndarray, np.ndarray]:
-    """Newton's method on the energy, from the undeformed boom at relative joint `angles` (rad).
+    """Newton's method on the energy, from the undeformed boom at relative joint `angles` (rad); SolverError if it fails.
 
-    Returns
-    -------
-    tuple
-        Coordinates, boom, multipliers of the constraints, Hessian of the Lagrangian.
-
-    Raises
-    ------
-    SolverError
-        None was found.
+    Coordinates, boom, multipliers of the constraints, Hessian of the Lagrangian.
     """
     q, multipliers = model.start(angles), None
     for iteration in range(PASSES):

@@ -19,18 +19,9 @@ from .geometry import Document, Mass, Point, Turn, dot, links, on_left, on_right
 
 @dataclass(frozen=True, slots=True)
 class PlacedBodies:
-    """A part at one heading.
+    """A part at one heading: J and dJ/dphi (kg m^2), `moments` sum m z' and `height` sum m z (kg m), the bush.
 
-    Attributes
-    ----------
-    inertia, slope : float
-        J and dJ/dphi, kg m^2.
-    moments : complex
-        sum m z', kg m: times gravity, the weight's force on phi.
-    height : complex
-        sum m z, kg m.
-    pin : Point
-        The bush.
+    Times gravity, the moments are the weight's force on phi.
     """
 
     inertia: float

@@ -18,18 +18,9 @@ Piece = tuple[Any, float | None]
 
 @dataclass(frozen=True)
 class Episode:
-    """Contact from a touch to the release, or to the end of the motion.
+    """Contact from a touch to the release, or to the end of the motion, s; greatest penetration, m.
 
-    Attributes
-    ----------
-    start, end : float
-        s.
-    entry : float
-        Approach speed at the touch, m/s.
-    exit : float
-        Speed of separation at the release, m/s; nan where the motion ends in contact.
-    depth : float
-        Greatest penetration, m.
+    `entry`, `exit`: approach speed at the touch, speed of separation at the release (nan if none), m/s.
     """
 
     start: float
@@ -60,25 +51,10 @@ def follow(
     longest: float = np.inf,
     method: str = "Radau",
 ) -> ContactMotion:
-    """Follow a motion with one contact.
+    """Follow a motion with one contact, to ascending `times`; `breaks`: where the drive is not smooth; steps <= `longest`; s.
 
-    Parameters
-    ----------
-    rates : callable
-        (time, state, entry) -> derivative of the state; `entry` is the approach speed at the last touch, None in flight.
-    gap : callable
-        (time, state) -> gap (m, positive in contact) and its rate (m/s).
-    start : ndarray, shape (n,)
-    times : ndarray, shape (m,)
-        s, ascending, of the rows.
-    breaks : sequence of float
-        Times at which the drive is not smooth.
-    longest : float
-        Longest step, s.
-
-    Returns
-    -------
-    ContactMotion
+    `rates`: (time, state, approach speed at the last touch or None in flight) -> derivative of the state.
+    `gap`: (time, state) -> gap (m, positive in contact) and its rate (m/s).
     """
     stops = [*sorted(t for t in breaks if times[0] < t < times[-1]), times[-1]]
     options = {"method": method, "rtol": rtol, "atol": atol, "max_step": longest}

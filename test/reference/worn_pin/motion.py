@@ -104,20 +104,7 @@ class PinnedBoom:
         method: str = "LSODA",
         rate: float = 0.0,
     ) -> PinMotion:
-        """Motion from an equilibrium, as `PinMotion`.
-
-        Parameters
-        ----------
-        drive : callable
-            Time (s) -> length (m) and rate (m/s) of the drive.
-        rest : Rest
-        times : ndarray, shape (m,)
-            s, ascending, of the rows.
-        breaks : sequence of float
-            Times at which the drive is not smooth.
-        rate : float
-            Rate of phi at the start, rad/s.
-        """
+        """Motion from an equilibrium, `rate` of phi in rad/s, to ascending `times` (s); `breaks`: of the drive."""
         # states are deviations from the rest, so that a relative tolerance means something
         zero = np.array([rest.phi, rest.length, rest.psi, 0.0, 0.0, 0.0])
         found = follow(
@@ -212,14 +199,7 @@ def _pairs(values: Sequence[complex]) -> np.ndarray:
 def freed(document: Document, headings: Sequence[float] | np.ndarray, index: int, contact: Contact | None) -> PinnedBoom:
     """`PinnedBoom` of cylinder `index` (0-based): what lies outboard turns as one body, what lies inboard is ground.
 
-    Parameters
-    ----------
-    document : dict
-        A scene's file; that cylinder has k, barrel and rod.
-    headings : sequence of float
-        rad, of the sections to the base's x axis.
-    contact : Contact or None
-        None: an ideal pin, for equilibria only.
+    That cylinder has k, barrel and rod. `headings` (rad) of the sections to the base's x axis. No contact: an ideal pin.
     """
     joint, places = document["joints"][index], geometry.pivots(document, headings)
     body = geometry.outboard(document, headings, index)

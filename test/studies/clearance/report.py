@@ -12,20 +12,7 @@ from boom_twin.system.atomic_files import write_atomic
 from boom_twin.validation.study.report import page, table
 
 from .pictures import RestOffsetCurve, Trace, sinking_picture, swing_picture
-from .rest_stop_cost import (
-    BRAKE,
-    COUNT,
-    HOLD,
-    MODELS,
-    QUICK_COUNT,
-    QUICK_HOLD,
-    Cost,
-    Shift,
-    Swing,
-    costs,
-    shifts,
-    swings,
-)
+from .rest_stop_cost import BRAKE, COUNT, HOLD, MODELS, QUICK_COUNT, QUICK_HOLD, Cost, Shift, Swing, costs, shifts, swings
 from .scenes import pins_of, with_play
 
 PINS = ("ideal", "contact", "linear")

@@ -6,13 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from compiled import first_row, rest_at, taken_apart
 from default_boom import motion_of, posture_angles, strokes_of_posture
 from studies.stops import StopMotion, halt
 
 from boom_twin import Scene, statics
-from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.methods import MethodRun, integrate_with
-from boom_twin.compiler.plan import first_row, taken_apart
 from boom_twin.scene.schema import IDEAL_BELOW
 
 from .scenes import Treatment, ideal, pin_like, rods_and_joints, treated, with_pins

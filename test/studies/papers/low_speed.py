@@ -27,17 +27,9 @@ PASSES = 20
 
 
 def tip_of_move(scene: Scene, move: StrokeMotion, step: float, every: int = 1, velocity_terms: bool = True) -> np.ndarray:
-    """Tip (m, rad) after every `every` steps of `step` (s), shape (rows, 3), from rest; ideal pins.
+    """Tip (m, rad) after every `every` steps of `step` (s), shape (rows, 3), from rest; ideal pins; or SolverError.
 
-    Parameters
-    ----------
-    velocity_terms : bool
-        Whether Coriolis and centrifugal accelerations are in the motion, as they are in `boom_twin.simulate`.
-
-    Raises
-    ------
-    SolverError
-        A step fails.
+    `velocity_terms`: Coriolis and centrifugal accelerations are in the motion, as they are in `boom_twin.simulate`.
     """
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()

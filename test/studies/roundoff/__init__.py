@@ -1,1 +1,1 @@
-"""Study of round-off: digits lost by two ways of combining elements, and the error of the tip over ever smaller steps."""
+"""Exact solution of one time step: the reference for digits lost to round-off."""

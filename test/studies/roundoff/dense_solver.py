@@ -14,8 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from compiled import Plan
 
-from boom_twin.compiler.plan import Plan
 from boom_twin.kernels.elements.cylinder import BARREL
 from boom_twin.kernels.elements.linkage import LINK_L
 from boom_twin.kernels.tables import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION, Z_LAMBDA, Z_LINK_L, Z_LINK_R

@@ -18,11 +18,7 @@ def document() -> dict[str, Any]:
 @pytest.fixture
 def one_rigid(document: dict[str, Any]) -> dict[str, Any]:
     """One rigid section of 40 kg on a massless, undamped cylinder with an oil spring."""
-    section = {
-        "length": 3.0,
-        "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0},
-        "rod_pin": [0.60, -0.12],
-    }
+    section = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}
     cylinder = {"k": 2.0e6, "closed_length": 1.08, "max_stroke": 0.79}
     joint = {"kind": "A", "range_deg": [-5, 85], "cylinder": cylinder}
     return document | {"sections": [section], "joints": [joint], "postures": {"up": [40]}}
@@ -31,14 +27,7 @@ def one_rigid(document: dict[str, Any]) -> dict[str, Any]:
 @pytest.fixture
 def cantilever(document: dict[str, Any]) -> dict[str, Any]:
     """One beam of 4 m, clamped at the pivot by an incompressible cylinder."""
-    section = {
-        "length": 4.0,
-        "beam": [0.0, 4.0],
-        "A": 3.0e-3,
-        "I": 1.0e-5,
-        "rho_A": 20.0,
-        "rod_pin": [0.0, -0.12],
-    }
+    section = {"length": 4.0, "beam": [0.0, 4.0], "A": 3.0e-3, "I": 1.0e-5, "rho_A": 20.0, "rod_pin": [0.0, -0.12]}
     cylinder = {"closed_length": 0.8, "max_stroke": 0.79}
     joint = {"kind": "A", "range_deg": [-30, 30], "cylinder": cylinder}
     base = {"pivot": [0.0, 0.0], "cylinder_pin": [1.2, -0.12]}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import stroke_curve
 
 pytest.importorskip("exudyn")
 
@@ -11,7 +12,6 @@ from default_boom import joint_angles_of_strokes, strokes_of_posture
 from oracle.oscillation import mean_frequency
 
 from boom_twin import Scene
-from boom_twin.scene.kinematics import stroke_curve
 from boom_twin.validation.rig import Move, Programme, simulate, statics
 
 G = 9.81

@@ -16,15 +16,11 @@ from boom_twin.validation.rig.faults import RigFault, check, drifting, parse
     "text, fault",
     [
         ("cylinder_2.k:softer:0.3", RigFault("cylinder_2.k", "softer", 0.3)),
-        ("joint_3.sensor:bias:-0.0035@20", RigFault("joint_3.sensor", "bias", -0.0035, 20.0)),
         ("cylinder_1.sensor:stuck@12.5", RigFault("cylinder_1.sensor", "stuck", onset=12.5)),
         ("cylinder_4.rod.clearance:play:0.0005", RigFault("cylinder_4.rod.clearance", "play", 5e-4)),
-        ("joint_angles.delay:late:0.03@10", RigFault("joint_angles.delay", "late", 0.03, 10.0)),
         ("cylinder_2.k:softer:0.4@20+5", RigFault("cylinder_2.k", "softer", 0.4, 20.0, 5.0)),
         ("tip.payload:more:20@0+2..40", RigFault("tip.payload", "more", 20.0, 0.0, 2.0, 40.0)),
-        ("section_3.EI:softer:0.4@0..40", RigFault("section_3.EI", "softer", 0.4, end=40.0)),
         ("cylinder_2.drive:drift:-0.0001@5..20", RigFault("cylinder_2.drive", "drift", -1e-4, 5.0, end=20.0)),
-        ("cylinder_force_2.sensor:bias:500", RigFault("cylinder_force_2.sensor", "bias", 500.0)),
     ],
 )
 def test_text_and_back(text, fault):
@@ -36,14 +32,10 @@ def test_text_and_back(text, fault):
     [
         ("foo:bias:1", "fault foo: not a cause. Give one of cylinder_i.k, "),
         ("joint_1.sensor:bend:1", "joint_1.sensor:bend: not a kind of this cause. Give one of bias, drift, "),
-        ("joint_1.sensor:bias", "size = 0, must be finite and not 0"),
         ("cylinder_2.k:softer:30", "size = 30, must be above 0 and below 1, a share"),
-        ("joint_1.sensor:stuck:3", "it has no size"),
         ("tip.payload:more:x", "size, onset, ramp and end must be numbers. Write CAUSE:KIND"),
         ("tip.payload:more:20@5+2..7", "end = 7 s, must be after 7 s, when it is there in full"),
-        ("joint_1.sensor:drift:1@5+2", "drift does not come on over a time. Leave out \\+2"),
         ("cylinder_1.rod.clearance:play:0.0005@5", "play from the start to the end. Leave out what follows @"),
-        ("cylinder_1.rod.clearance:play:0.2", "must be above 0 and below 0.005 m"),
     ],
 )
 def test_refused(text, told):
@@ -59,7 +51,6 @@ def test_refused(text, told):
         (["cylinder_2.drive:drift:0.05@50"], r"size = 0\.05, must be at most 0\.042 on this boom"),
         (["joint_4.sensor:bias:1@60"], "begins at 60 s, must be before the end at 60 s"),
         (["tip.payload:more:1e6"], "on this boom"),
-        (["tip.payload:less:20"], "on this boom"),
         (["joint_angles.delay:late:3600"], "on this boom"),
     ],
 )

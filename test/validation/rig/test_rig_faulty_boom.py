@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from default_boom import parameter_names
 
 pytest.importorskip("exudyn")
 
 from default_boom import parameter, strokes_of_posture
 
 from boom_twin import Scene, UsageError, load_scene
-from boom_twin.scene.edit import parameter_names
 from boom_twin.validation.rig import Move, Programme, Sensors, record, simulate, statics
 from boom_twin.validation.rig.faults import changes, parse, with_faults, wrong_by
 

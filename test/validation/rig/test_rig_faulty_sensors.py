@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from recordings import samples_of
 
 pytest.importorskip("exudyn")
 
 from boom_twin import Stream
-from boom_twin.bag.session_writer import samples_of
 from boom_twin.validation.rig.faults import SPIKE_SHARE, parse, spoil
 from boom_twin.validation.rig.session import EPOCH, RigSession
 

@@ -112,10 +112,3 @@ def test_the_error_studys_booms_move_as_the_reference(elements, lumped, scheme, 
     acceleration = np.sqrt(np.mean(expected["tip_ax_m_s2"] ** 2 + expected["tip_ay_m_s2"] ** 2))
     assert 1e3 * away("tip", "tip_x_m", "tip_y_m") < most_mm
     assert away("tip_acc", "tip_ax_m_s2", "tip_ay_m_s2") < most_acceleration * acceleration
-
-
-def test_play_needs_the_rod():
-    pin = Pin(at="cylinder_1.rod", pin_radius=0.025, radial_clearance=1e-4)
-    scene = load_scene().model_copy(update={"clearance": Clearance(pins=(pin,))})
-    with pytest.raises(UsageError, match="lumped=False"):
-        at_rest(scene, strokes_of_posture(scene, "arch"), 2, lumped=True)

@@ -15,10 +15,7 @@ from boom_twin.validation.rig import Move, Programme, observe, simulate
 from boom_twin.validation.rig.session import EPOCH, Sensors, read, specific_force
 
 
-@pytest.mark.parametrize(
-    ("sigma", "resolution"),
-    [(2e-5, 5e-6), (math.radians(0.01), math.radians(0.005))],
-)
+@pytest.mark.parametrize(("sigma", "resolution"), [(2e-5, 5e-6), (math.radians(0.01), math.radians(0.005))])
 def test_noise_and_rounding(sigma, resolution):
     true = np.full((20_000, 2), 0.123456)
     values = read(true, sigma, resolution, np.random.default_rng(5))

@@ -11,9 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
-from oracle import booms
-
-from boom_twin.validation.study import error, error_runs
 
 
 @pytest.fixture(scope="module")
@@ -49,14 +46,3 @@ def test_errors_fall_with_the_order_of_the_scheme(content, method, expected):
     rows = [row for row in rows_of(content, method=method) if row["step"] >= 2e-3]
     steps, errors = np.array([[row["step"], row["own_mm"]] for row in rows]).T
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(expected, abs=0.15)
-
-
-def test_without_exudyn_the_report_goes_on(tmp_path, monkeypatch):
-    reason = "boom_twin.validation.rig needs the package exudyn, which is not installed"
-    monkeypatch.setattr(error_runs, "load_rig", lambda: (None, reason))
-    error.write(booms.random_boom(8), tmp_path, quick=True)
-    content = json.loads((tmp_path / "error.json").read_text())
-    assert content["exudyn_missing"] == reason and content["same_step"] is None
-    assert {row["program"] for row in content["rows"]} == {"boom_twin"}
-    assert all(row["tip_mm"] == row["own_mm"] for row in content["rows"])
-    assert reason in (tmp_path / "error.md").read_text()

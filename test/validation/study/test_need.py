@@ -71,37 +71,6 @@ def test_an_error_that_is_none_is_refused(two_sections: Scene) -> None:
             propose(two_sections, most)
 
 
-def test_refusals_of_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    path, other = str(tmp_path / "boom.yaml"), tmp_path / "other.yaml"
-    other.write_text("# by hand\n")
-    for given, told in (
-        (["--out", "x.yaml"], "--out x.yaml: goes with --need only"),
-        ([path, "--need", "tip=1mm", "--out", path], "this file is read. Name another one"),
-        (["--need", "tip=1mm", "--out", str(other)], "other.yaml: is there already, and is not written over"),
-    ):
-        assert main(["check", *given]) == 1
-        assert told in capsys.readouterr().err
-    assert other.read_text() == "# by hand\n"
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("1mm", "like tip=1mm"),
-        ("tip=nan", "like tip=1mm"),
-        ("tip=-1mm", "must be positive and finite"),
-        ("tip=1in", "the unit 'in' is none of mm, cm, m"),
-        ("joint_1=1mm", "only the error of the tip can be stated"),
-    ],
-)
-def test_nonsense_is_one_clear_error(text: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["check", "--need", text])
-    out, err = capsys.readouterr()
-    assert stop.value.code == 2 and out == ""
-    assert words in err and err.count("error:") == 1
-
-
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory, two_sections: Scene) -> tuple[Path, Path]:
     """A scene file and where its lean one goes."""
