@@ -31,7 +31,7 @@ from ..kernels.jit import inner, kernel
 from .channels import IMU_ZERO
 from .kalman import ANGLE_ZERO, FAST, correct, free_sensors, make_transition, transit
 from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
-from .mixture import copy_model, interact, mix, weigh_models
+from .mixture import copy_model, interact, mix, models_of, weigh_models
 from .rows import SWAY_SHARE, clear, column_row, drive_row, read, variance_of
 from .states import (
     ALL_OPEN,
@@ -107,35 +107,34 @@ def first_scale(p, i):
 @kernel
 def step_models(p, f, h, y):
     """Step all models by `h` (s) to readings `y` that drive the model (n; lengths in m or angles in rad; NaN = missing)."""
-    size, every = zero_place(p), all_states(p)
+    size, mixtures = zero_place(p), 1 + f.status[FED]
     learn_length_noise(f, h, y)
     burst2 = f.noise.burst_load * f.noise.burst_load
     if h > 0.0:
         steps = max(1, math.ceil(h / LONGEST_STEP - 1e-6))
-        interact(f, PREDICTION, size, h)
-        if f.status[FED] == 1:
-            interact(f, ESTIMATE, every, h)
+        for mixture in range(mixtures):
+            interact(f, mixture, states_of(p, mixture), h)
         make_transition(p, f, h / steps)
         for _ in range(steps):
-            for k in range(3):
-                transit(p, f, k, size, h / steps, f.load2[PREDICTION], burst2 if k == BURST else 0.0)
-            if f.status[FED] == 1:
-                for k in range(2):
-                    transit(p, f, ALL_VALVES + k, every, h / steps, f.load2[ESTIMATE], f.chances[BURST] * burst2)
-        hold_still(p, f, VALVES, size)
-        hold_still(p, f, BURST, size)
-        if f.status[FED] == 1:
-            hold_still(p, f, ALL_VALVES, every)
+            for mixture in range(mixtures):
+                first, count = models_of(mixture)
+                for k in range(first, first + count):
+                    burst = f.chances[BURST] if mixture == ESTIMATE else 1.0 if k == BURST else 0.0
+                    transit(p, f, k, states_of(p, mixture), h / steps, f.load2[mixture], burst * burst2)
+        for mixture in range(mixtures):
+            first, count = models_of(mixture)
+            for k in range(first, first + count):
+                if k != OPEN and k != ALL_OPEN:
+                    hold_still(p, f, k, states_of(p, mixture))
     note_innovations(p, f, y)
-    for k in range(3):
-        f.likely[k] = take_lengths(p, f, k, size, y)
-    evidence = weigh_models(f, PREDICTION)
-    mix(f, PREDICTION, size)
+    evidence = 0.0
+    for mixture in range(mixtures):
+        first, count = models_of(mixture)
+        for k in range(first, first + count):
+            f.likely[k] = take_lengths(p, f, k, states_of(p, mixture), y)
+        evidence = weigh_models(f, mixture)
+        mix(f, mixture, states_of(p, mixture))
     if f.status[FED] == 1:
-        for k in range(2):
-            f.likely[ALL_VALVES + k] = take_lengths(p, f, ALL_VALVES + k, every, y)
-        evidence = weigh_models(f, ESTIMATE)
-        mix(f, ESTIMATE, every)
         leave_contradiction(p, f, size)
     f.evidence[0] += evidence
     if h > 0.0:
@@ -144,6 +143,12 @@ def step_models(p, f, h, y):
         learn_load(p, f, h)
     if f.status[FED] == 0:
         follow_prediction(p, f)
+
+
+@inner
+def states_of(p, mixture):
+    """Return the number of states of a mixture's models."""
+    return zero_place(p) if mixture == PREDICTION else all_states(p)
 
 
 @inner

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
-from numba.core.bytecode import FunctionIdentity
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
@@ -85,7 +84,7 @@ class KernelCompiler(Compiler):
     _owners: ClassVar[dict[tuple[str, str], Callable[..., Any]]] = {}
 
     def _compile_bytecode(self) -> Any:
-        name: FunctionIdentity = self.state.func_id
+        name = self.state.func_id
         if self._owners.setdefault((name.modname, name.func_qualname), name.func) is name.func:
             name.unique_id, name.unique_name = 0, name.func_qualname  # numba counts from 1 in the order of compiling
         self.state.library = KernelCode(self.state.targetctx.codegen(), name.func_qualname)

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
 from importlib import import_module
 from pathlib import Path
+from threading import Lock
 from typing import Any, TypeVar
 
 import numpy as np
@@ -23,7 +24,6 @@ from .compiled_cache import SUFFIX, KernelCache, cache_folder, claim, fault_of
 Fields = TypeVar("Fields")
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
-DOCUMENTED = frozenset({"nogil", "error_model"})
 COMPILING = "compiling the model, about a minute; done once for this version and kept in %s"
 NOT_KEPT = "compiling the model, about a minute each time, because compiled code is not kept: %s"
 LAYOUT = 0x1 | 0x2 | 0x100 | 0x400
@@ -32,6 +32,7 @@ CONFIG_FILE = ".numba_config.yaml"
 """numba takes its settings from this file in the working directory, which may be a received session's."""
 _BY_REFERENCE: set[type] = set()
 _UNREGISTERED: list[type] = []
+_REGISTERING = Lock()
 
 
 def by_reference(kind: type[Fields]) -> type[Fields]:
@@ -73,23 +74,12 @@ def _tell_not_kept(reason: str) -> None:
 def _register_references() -> None:
     """Make the classes known that are to be taken by reference; no thread takes one for known that is not yet."""
     if _UNREGISTERED:
-        from numba.core.compiler_lock import global_compiler_lock
-
         from .references import register
 
-        with global_compiler_lock:
+        with _REGISTERING:
             while _UNREGISTERED:
                 register(_UNREGISTERED[0])
                 del _UNREGISTERED[0]
-
-
-def _known(options: dict[str, Any]) -> dict[str, Any]:
-    """Return the options that this numba has; without those that are not documented it only compiles slower code."""
-    try:
-        from numba.core.cpu import CPUTargetOptions
-    except ImportError:
-        CPUTargetOptions = None
-    return {name: value for name, value in options.items() if name in DOCUMENTED or hasattr(CPUTargetOptions, name)}
 
 
 def _kind(value: Any) -> Any:
@@ -134,7 +124,7 @@ class Kernel:
         """numba's object, made on first use."""
         numba = _numba()
         _register_references()
-        dispatcher = numba.njit(**_known({**OPTIONS, **self._options}), **self._compiler())(self.py_func)
+        dispatcher = numba.njit(**OPTIONS, **self._options, **self._compiler())(self.py_func)
         if self._cached and not numba.config.DISABLE_JIT and (folder := _folder()) is not None:
             try:
                 dispatcher._cache = KernelCache(self.py_func, folder)

@@ -18,10 +18,18 @@ from typing import Any
 
 from llvmlite import ir
 from numba.core import cgutils
-from numba.core.imputils import lower_getattr_generic
-from numba.core.types import NamedTuple, Type, int64  # type: ignore[attr-defined]
-from numba.core.typing.templates import AttributeTemplate, infer_getattr
-from numba.extending import NativeValue, intrinsic, models, register_model, typeof_impl, unbox
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import (
+    NativeValue,
+    infer_getattr,
+    intrinsic,
+    lower_getattr_generic,
+    models,
+    register_model,
+    typeof_impl,
+    unbox,
+)
+from numba.types import NamedTuple, Type, int64
 
 from .jit import HeldFields
 

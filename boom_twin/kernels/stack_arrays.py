@@ -11,9 +11,9 @@ from typing import Any
 from llvmlite import ir
 from numba.core import cgutils
 from numba.core.registry import cpu_target
-from numba.core.types import Array, intp
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
+from numba.types import Array, intp
 
 
 def type_of_maker(shape: tuple[int, ...]) -> Any:

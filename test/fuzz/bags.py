@@ -215,11 +215,14 @@ def _unvouched(random: Generator, data: bytes) -> bytes:
 def judge(path: Path) -> Verdict:
     """Read, tell, replay and save."""
     with tempfile.TemporaryDirectory() as place:
-        out = Path(place)
-        saved = [_recovered(path, out / name, name == "loose") for name in ("sound", "loose")]
         code, words = printed("info", str(path))
         told = _refused(words)
-        return worst(_read(path), told if code or told.is_finding else Verdict(Kind.EQUAL), _replayed(path), *saved)
+        return worst(
+            _read(path),
+            told if code or told.is_finding else Verdict(Kind.EQUAL),
+            _replayed(path),
+            _recovered(path, Path(place)),
+        )
 
 
 def _read(path: Path) -> Verdict:
@@ -259,10 +262,11 @@ def _results(path: Path) -> Counter[Message]:
         return Counter(_messages(scan(out / "bag")))
 
 
-def _recovered(path: Path, out: Path, is_loose: bool) -> Verdict:
+def _recovered(path: Path, place: Path) -> Verdict:
     """A rescue tells what is lacking, invents nothing, and takes nothing from outside."""
+    out = place / "saved"
     try:
-        outcome = recover(path, out, is_loose)
+        outcome = recover(path, out)
     except BagError as error:
         return _refused(str(error))
     for file in out.iterdir():
