@@ -68,7 +68,7 @@ class Run(NamedTuple):
     row: int
     rows: Results
     passes: float  # mean of a step
-    jolt: float
+    jolt: float  # see `boom_twin.kernels.transfer.time_step.run`
     shake: float
     square: float  # sum of h^2 over all steps, s^2
     longest: float  # longest step, s
@@ -148,7 +148,7 @@ def spring_free(plan: Plan, lengths: Array, forces: Array) -> Array:
 def drives_as_read(plan: Plan, strokes: Array, forces: Array, reads: StrokeReading) -> Array:
     """Return the drives (m) where transducers read `strokes` (m) under `forces` (N), all (.., n); NaN if there are none.
 
-    At work lengths swing with the forces in the oil. Drives show how the boom is driven, and in which posture it would rest.
+    In motion, oil forces change the cylinder lengths. Drives exclude this: they tell where the boom would rest.
     The oil's damping is left out: its lag is some milliseconds.
     """
     drives = np.array(strokes)

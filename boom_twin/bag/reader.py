@@ -99,7 +99,7 @@ def _by_number(path: Path) -> list[tuple[int, str]]:
 def readable(file: SessionFile, asked: Mapping[str, str]) -> set[int]:
     """Return the channels that hold CDR of the types `asked` for by topic; others of such a topic are passed over.
 
-    Raise BagError if a topic is in another encoding alone, or a message is defined otherwise than in Jazzy.
+    Raise BagError if no channel of a topic is encoded as CDR, or a message is defined otherwise than in Jazzy.
     """
     found: set[int] = set()
     for topic, kind in asked.items():

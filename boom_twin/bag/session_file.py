@@ -136,7 +136,10 @@ class SessionFile(ABC):
         compare_counts(self.path, source, one, other, two)
 
     def type_of(self, channel: Channel) -> str:
-        """Return the type of a channel as ``package/msg/Name``, whose name may be in two parts or of DDS; "" without one."""
+        """Return the type of a channel as ``package/msg/Name``; "" without a schema.
+
+        Names such as ``package/Name`` or ``package::msg::dds_::Name_`` are accepted.
+        """
         schema = self.schemas.get(channel.schema_id)
         parts = schema.name.replace("::", "/").split("/") if schema else [""]
         if parts[-2:-1] == ["dds_"]:
@@ -150,7 +153,7 @@ class SessionFile(ABC):
     def blocks(self, passed: Set[int]) -> Iterator[MessageBlock]:
         """Yield blocks of all messages, except of the `passed` channels, in the order of log times.
 
-        The sources of a block are channels. This default requires `heads` in that order.
+        `sources` of a block holds channel numbers. This default requires that `heads` yields messages by log time.
         """
         found = (each for each in self.heads() if each[0] not in passed)
         while group := list(islice(found, TOGETHER)):

@@ -229,7 +229,7 @@ class MessageWriter:
     """Context manager that writes a session of one file.
 
     Leaving the context completes the bag. After an exception the file keeps no end, so that it is not taken for whole;
-    `boom_twin.bag.recovery.recover` saves its messages. `topics` have any keys, which `write` takes; their names are made
+    `boom_twin.bag.recover.recover` saves its messages. `topics` have any keys, which `write` takes; their names are made
     absolute. `notes` state, for instance, that the session is synthetic. Options are those of `BagWriter`.
     """
 

@@ -1,10 +1,11 @@
 """Readings of late streams as states of the estimate.
 
-A reading that arrives late belongs to a state of the past. What a late stream reads at an instant is therefore copied into
-the state vector, with its covariance, when the boom is there (stochastic cloning: S. Roumeliotis and J. Burdick, Proc. IEEE
-Int. Conf. Robotics and Automation 2002, 1788-1795). A copy has no dynamics. All later readings correct it as they correct the
-other states, as in a fixed-lag smoother, and the late reading is a reading of the copy. That is exact: the estimate is the
-one of all readings in any order. Between two copies they are interpolated.
+A reading that arrives late belongs to a state of the past. When the boom passes an instant, the reading expected there from
+a late sensor is copied into the state vector, with its covariance (stochastic cloning: S. Roumeliotis and J. Burdick, Proc.
+IEEE Int. Conf. Robotics and Automation 2002, 1788-1795). A copy has no dynamics. All later readings correct it as they correct
+the other states, as in a fixed-lag smoother, and the late reading is a reading of the copy. At copied instants this is exact
+for a linear filter: the order of arrival does not change the estimate. A reading between two copied instants is compared with
+the linear interpolation of both copies.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from ..kernels.jit import inner
 from .rows import clear, difference, read, spread_of
 from .states import ALL_OPEN, ALL_VALVES, DELAYED, ESTIMATE, FED, PREDICTION, all_states, copy_place
 
-FEWEST_INSTANTS = 4  # that have room, else a further late stream is left out
+FEWEST_INSTANTS = 4  # that must fit into `DELAYED` states; a late stream that would leave fewer is not copied
 NEAREST = 4e6  # ns from one instant to the next, at least: a tenth of the period of the fastest mode
 EARLIEST = -(2**62)  # ns
 
@@ -29,7 +30,10 @@ def copy_width(f):
 
 @inner
 def note_lateness(p, f, stream, first, last, age):
-    """Note that a sample of channels `first` to `last` - 1 is `age` (s) old; new late channels restart all copies."""
+    """Note that a sample of channels `first` to `last` - 1 is `age` (s) old.
+
+    If these channels were not late before, all copies are discarded, because each instant now needs more states.
+    """
     width = copy_width(f)
     if f.copies[first] < 0 and (width + last - first) * FEWEST_INSTANTS <= DELAYED:
         for c in range(first, last):
@@ -62,7 +66,8 @@ def instant_beyond(f, count, stamp):
 def begin_instant(p, f, stamp):
     """Make room for the copies at the newest instant; return its first state, -1 without late streams.
 
-    The newest instant is replaced if it is nearer than `NEAREST` to the one before, or so near that the room would not last.
+    The newest instant is replaced if it is nearer than `NEAREST` to the one before, or if instants at this
+    spacing could not span the longest lateness.
     """
     width = copy_width(f)
     if width == 0 or f.status[FED] == 0:
@@ -95,7 +100,7 @@ def copy_reading(p, f, at, value):
 
 @inner
 def copy_to(f, x, covariance, at, every):
-    """Set entry `at` of a state to the reading of `f.row`."""
+    """Set state `at`, and its row and column of the covariance, to the reading with the coefficients `f.row`."""
     spread_of(f.row, covariance, f.gain, every)
     x[at] = f.mean[PREDICTION, at] + difference(f.row, x, f.mean[PREDICTION], every)
     f.gain[at] = read(f.row, f.gain, every)

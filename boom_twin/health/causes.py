@@ -1,12 +1,13 @@
 """Fault hypotheses of a boom, and the decision which of them is named.
 
 Every second gives each hypothesis a gain: its log likelihood less that of the boom as believed. The evidence of a hypothesis is
-the sum of its gains since the best onset. A cause is named if its posterior probability is high. Three facts limit that.
+the largest sum of its gains up to now, over all possible onsets.
+A cause is named if its posterior probability is high. Three facts limit that.
 
 - Successive innovations are not independent. So likelihoods are raised to the power `TEMPER`.
-- An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. The likelihood of such a
-  second is the same for all, exp(-`MOST_GAIN`) times the best.
-- Parameters of a healthy boom are wrong by `WRONG`. The size of a named fault must exceed what that looks like.
+- An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. In each
+  second no log likelihood counts as more than `MOST_GAIN` below the best.
+- Parameters of a healthy boom are wrong by `WRONG`. A fault is named only if it is larger than these errors make it appear.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ class Fault(NamedTuple):
 
     cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off`` or
     ``late``. size : relative loss, kg, kg/m, s; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis ``off``
-    lets the zero drift by any amount. is_told : False if it gives no alarm, and only keeps others from being named for it.
+    lets the zero drift by any amount. is_told : False for a fault without an alarm; it competes so
+    that its effect is not blamed on others.
     """
 
     cause: str
@@ -127,7 +129,7 @@ def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -
 def usual_size(scene: Scene, fault: Fault) -> float:
     """Return the standard deviation of what looks like a fault in a healthy boom, whose parameters are wrong by `WRONG`.
 
-    Masses of n equal sections, each wrong by itself, turn a straight boom of mass M as a payload of `WRONG` M / sqrt(3 n).
+    Independent mass errors of n equal sections turn a straight boom of mass M like a payload of `WRONG` M / sqrt(3 n).
     """
     if fault.kind == "softer":
         return WRONG

@@ -247,7 +247,7 @@ class FaultTwins:
     def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
         """Name the fault of a verdict, or end it if it is named; return its alarm.
 
-        A cylinder that creeps looks softer. So a softer one is named once it could have been seen to creep.
+        A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show.
         """
         fault = self._faults[verdict.place]
         if fault.cause.startswith("cylinder_") and fault.kind == "softer" and fault not in self._named:

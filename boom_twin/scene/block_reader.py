@@ -134,7 +134,7 @@ def unit_of(meaning: str) -> str | None:
 
 
 def converted(value: Any, unit: str | None) -> Any:
-    """Return `value` with every text in it that is a number with a fitting unit as a number in `unit`; all else as it is."""
+    """Return `value` with texts such as ``8500 mm`` converted to numbers in `unit`; everything else unchanged."""
     if isinstance(value, tuple):
         return tuple(converted(item, unit) for item in value)
     if isinstance(value, dict):

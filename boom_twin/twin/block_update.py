@@ -84,7 +84,8 @@ class BlockUpdate:
     def advance(self, run: Run | None, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
         """Take regular samples of a block of at most `capacity`; return why that ended, see `DONE`, and how many were taken.
 
-        `run` is the present one. `trusted`: the only sample was looked at before. `rows` or `report` return the results.
+        `run` is the present one. `trusted`: the block has one sample, which `SampleTaker` has checked.
+        `rows` or `report` return the results.
         """
         self.judge()
         self.make_room()
@@ -96,7 +97,7 @@ class BlockUpdate:
                 break
             self._look_around(run, row)
             row += 1
-            if row == size:  # the judgement, if one is due, is for who asked to take
+            if row == size:  # last sample: the caller decides when health is judged
                 reason = DONE
                 break
             self._take_judgement(row - 1)
@@ -143,7 +144,7 @@ class BlockUpdate:
 
     @property
     def is_due(self) -> bool:
-        """Return True if the newest sample began a slot and the rig's health has not been judged since."""
+        """Return True if the newest sample was the first of a slot of `SLOT` and health was not judged since."""
         return self._due is not None
 
     def judge(self) -> Health | None:

@@ -130,7 +130,7 @@ def row_of(estimate: Estimate) -> Array:
 class ResidualBlock(NamedTuple):
     """Residuals, in the order in which they became known; see `Residuals`."""
 
-    at: Integers  # (r,), row of the sample by which it became known: its own, or the stroke sample that it waited for
+    at: Integers  # (r,), row of the sample that made it computable: its own, or the later stroke sample that it waited for
     streams: Integers  # (r,), by `CODES`
     stamps: Integers  # (r,)
     values: Array  # (r, w), NaN behind a stream's own channels
@@ -144,7 +144,7 @@ class Note(NamedTuple):
     events: tuple[str, ...] = ()
     status: str = "ok"
     change: Change | None = None
-    was_held: bool = False  # True if the sample was held before, and had a report then
+    was_held: bool = False  # True if an earlier report already announced this sample as held
 
 
 REGULAR = Note()
@@ -248,11 +248,11 @@ EVENTS = {
     "duplicate": "stamp as the newest one of its stream, within 20 us; sample left out",
     "partial": "some values missing, not finite or absurd; the others were used",
     "empty": "no usable value; sample left out",
-    "waiting": "no message with all strokes yet, or started less than a second ago; the model has not started",
+    "waiting": "no message with all strokes yet, or the model failed less than a second ago; it has not started",
     "gap": "longer pause between strokes, bridged",
     "restart": "pause too long to bridge, or strokes elsewhere after it; started again from rest",
     "stroke elsewhere": "a stroke jumped where its cylinder cannot go, and stayed there for a second; started from rest",
-    "leap": "stamp far from where its stream was; left out unless the next follows it within `gap`: slower strokes need more",
+    "leap": "stamp far from where its stream was; left out unless the next follows within `gap`, or 1.75 usual intervals",
     "clock set": "stamps went on elsewhere, strokes where they were; the model goes on, by the new stamps",
     "jump back": "time was set back, and strokes did not go on where they were; started again from rest",
     "second source": "samples of another source among those that are followed; left out",
@@ -273,7 +273,7 @@ CONSEQUENCES = frozenset({"waiting", "model"})
 """Events that follow from others."""
 
 TOLD_AT_ONCE = frozenset({"restart", "stroke elsewhere", "clock set", "jump back", "reset", "load", "limits", "zero"})
-"""Events that `Report.change` goes with."""
+"""Events whose report also has a `Change`."""
 
 
 def event_meaning(name: str, reads: StrokeReading) -> str:

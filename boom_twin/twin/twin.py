@@ -35,8 +35,8 @@ class Twin(SampleTaker):
     health : bool
         Judge the rig's health, see `Report.health`.
     reads : StrokeReading
-        What drives the model: the lengths of the cylinders, oil compressed; of sessions that were made before version 0.2.0,
-        their drives; or, of a boom without stroke transducers, the angles of its joints.
+        What drives the model: cylinder lengths, which include the compression of the oil; drives, which do not, in sessions
+        before 0.2.0; or the angles of the joints, of a boom without stroke transducers.
     absent : collection of str
         Channels without a sensor, such as ``joint_3``: no reading of them is missed.
     doubted : collection of str
@@ -44,7 +44,7 @@ class Twin(SampleTaker):
     causes : bool
         With `health`, causes of faults are named, see `boom_twin.health.fault_twins`.
     is_live : bool
-        True if no sample may wait for the name of a cause.
+        True in a live node: `update` does not wait for the fault twins.
     places : mapping of str to Place, optional
         Of sensors that have one, such as ``imu_2``. The tip IMU is at the tip if it is not among them.
     lagging : collection of Stream
@@ -66,8 +66,8 @@ class Twin(SampleTaker):
 
     Notes
     -----
-    Everything predicted is a function of the accepted samples that drive the model alone; all others only give residuals, each
-    against the prediction interpolated at its own stamp, in whatever order samples arrive.
+    Predictions depend only on accepted samples that drive the model. All other samples correct the estimate and give residuals,
+    each against the prediction interpolated at its own stamp, in whatever order samples arrive.
     """
 
     def __repr__(self) -> str:
@@ -83,7 +83,7 @@ class Twin(SampleTaker):
             self.reset()
             return
         self._begin()
-        self.requests.zero({})  # what they are holds with the first strokes
+        self.requests.zero({})  # no new zeros: this marks a change as due with the first strokes
 
     @property
     def evidence(self) -> float:
@@ -165,8 +165,8 @@ class Twin(SampleTaker):
             Values of one stream at one stamp, in the scene's order; or readings in SI units by name, of any streams, as for
             `boom_twin.twin.sample_check.samples_of`. Their reports are one.
         judged : bool
-            With the judgement of the rig's health, where that is due. Without it the rest comes sooner, and `judge_health`
-            is to be called next.
+            With the judgement of the rig's health, where that is due. If False, the report returns sooner; call `judge_health`
+            next.
         stamp_ns : int, optional
             Time of readings by name, ns.
 

@@ -152,7 +152,7 @@ class Recorder:
         self._judge, self._twin_values = ComponentJudge("recording"), _TwinValues(node)
 
     def run(self, stopped: Callable[[], bool], on_twin: Callable[[Mapping[str, object]], None]) -> list[TopicCount]:
-        """Record until `stopped`, which is asked every `boom_twin.ros.runtime.WAKE` s; return the counts by topic.
+        """Record until `stopped`, which is asked every `boom_twin.ros.receive.WAKE` s; return the counts by topic.
 
         `on_twin` is told what the twin says of itself, if there is one: its ``parameters``, and the text of its ``scene``.
         Raise BagError if the bag cannot be written, or not all that was received was written. Raise UsageError if the type of
