@@ -61,7 +61,7 @@ def load_mapping(path: Path | None = None, joints: int | None = None) -> Topics:
     """
     if path is None:
         return load_topics()
-    return mapping_from(read_plain(path, UsageError, "Give a file like msg_config/topics.yaml."), str(path), joints)
+    return mapping_from(read_plain(path, UsageError, "Give a file as `boom_twin mapping` prints it."), str(path), joints)
 
 
 def mapping_from(document: Any, source: str, joints: int | None = None) -> Topics:

@@ -126,7 +126,7 @@ def commission(
         silent = [name for name in names if name not in heard or not np.isfinite(heard[name].values).any()]
         without = f": {', '.join(silent)} never had a value" if silent else ""
         lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes{without}"
-        raise BagError(f"{lacking}. Give the boom's scene by --scene.")
+        raise BagError(f"{lacking}. Give the boom's scene by --scene, or the session's mapping.")
     _mend(document, found)
     absent = [each.channel for each in found.verdicts if found.lacks(each) and each.channel not in mapped.topics.absent]
     for channel in absent:

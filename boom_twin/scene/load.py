@@ -222,7 +222,10 @@ def load_scene(source: str | Path | Mapping[str, Any] | None = None) -> Scene:
     Raises
     ------
     SceneError
-        With every fault that was found: place, value, bound, remedy.
+        With every fault of the first stage that has any (values, keys that need each other, geometry): place, value, bound,
+        remedy.
+    UsageError
+        The source is none of these.
 
     Warns
     -----
@@ -231,8 +234,10 @@ def load_scene(source: str | Path | Mapping[str, Any] | None = None) -> Scene:
     """
     if isinstance(source, Mapping):
         scene, oddities = examine_text(text_of(source), "mapping")
-    else:
+    elif source is None or isinstance(source, str | Path):
         scene, oddities = examine(source)
+    else:
+        raise UsageError(f"scene = {source!r}: give a Scene, the path of a scene file, a dict with its keys, or None.")
     for oddity in oddities:
         warnings.warn(str(oddity), SceneWarning, stacklevel=2)
     return scene
@@ -244,11 +249,7 @@ SceneSource = Scene | Mapping[str, Any] | str | Path | None
 
 def as_scene(source: SceneSource) -> Scene:
     """Return the scene that `source` is, names or describes, see `load_scene`. UsageError if it is none of `SceneSource`."""
-    if isinstance(source, Scene):
-        return source
-    if source is None or isinstance(source, str | Path | Mapping):
-        return load_scene(source)
-    raise UsageError(f"scene = {source!r}: give a Scene, the path of a scene file, a dict with its keys, or None.")
+    return source if isinstance(source, Scene) else load_scene(source)
 
 
 def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:
