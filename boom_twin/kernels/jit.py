@@ -24,6 +24,7 @@ from .compiled_cache import SUFFIX, KernelCache, cache_folder, claim, fault_of
 Fields = TypeVar("Fields")
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+DOCUMENTED = frozenset({"nogil", "error_model"})
 COMPILING = "compiling the model, about a minute; done once for this version and kept in %s"
 NOT_KEPT = "compiling the model, about a minute each time, because compiled code is not kept: %s"
 LAYOUT = 0x1 | 0x2 | 0x100 | 0x400
@@ -82,6 +83,15 @@ def _register_references() -> None:
                 del _UNREGISTERED[0]
 
 
+def _known(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options that this numba has; without those that are not documented it only compiles slower code."""
+    try:
+        from numba.core.cpu import CPUTargetOptions
+    except ImportError:
+        CPUTargetOptions = None
+    return {name: value for name, value in options.items() if name in DOCUMENTED or hasattr(CPUTargetOptions, name)}
+
+
 def _kind(value: Any) -> Any:
     """Return all that numba's type of an argument depends on, fifty times as fast as that type."""
     if isinstance(value, np.ndarray):
@@ -124,7 +134,7 @@ class Kernel:
         """numba's object, made on first use."""
         numba = _numba()
         _register_references()
-        dispatcher = numba.njit(**OPTIONS, **self._options, **self._compiler())(self.py_func)
+        dispatcher = numba.njit(**_known({**OPTIONS, **self._options}), **self._compiler())(self.py_func)
         if self._cached and not numba.config.DISABLE_JIT and (folder := _folder()) is not None:
             try:
                 dispatcher._cache = KernelCache(self.py_func, folder)
