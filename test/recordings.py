@@ -12,7 +12,7 @@ from boom_twin.bag.reader import Session, read, read_both, scan
 from boom_twin.bag.recover import Recovery, recover
 from boom_twin.bag.session_model import FILE_NAME as SHEET
 from boom_twin.bag.session_model import SessionSheet, incompleteness, kept, mapping_of, scene_of
-from boom_twin.bag.session_writer import samples_of, sensor_message, write_samples
+from boom_twin.bag.session_writer import samples_in_rows, sensor_message, write_samples
 from boom_twin.bag.writer import FILE_NAME, MessageWriter
 from boom_twin.messages.mapping import load_mapping
 from boom_twin.offline.ground_truth import FILE_NAME as TRUTH
@@ -21,7 +21,7 @@ from boom_twin.types import Array
 
 __all__ = [
     "FILE_NAME", "METADATA", "SHEET", "TRUTH", "MessageWriter", "Recovery", "Session", "SessionSheet", "incompleteness",
-    "kept", "load_mapping", "load_truth", "mapping_of", "read", "read_both", "read_metadata", "recover", "samples_of",
+    "kept", "load_mapping", "load_truth", "mapping_of", "read", "read_both", "read_metadata", "recover", "samples_in_rows",
     "scan", "scene_of", "sensor_message", "write_metadata", "write_samples", "write_session",
 ]  # fmt: skip
 
@@ -40,4 +40,4 @@ def write_session(
     """Write rows of readings at `stamps_ns` as a session; angles may have stamps of their own."""
     values = {Stream.STROKES: strokes, Stream.ANGLES: joints, Stream.IMU: imu, Stream.FORCES: forces, **(placed or {})}
     there = {stream: rows for stream, rows in values.items() if rows is not None}
-    write_samples(directory, samples_of(stamps_ns, there, angle_stamps_ns), there, description)
+    write_samples(directory, samples_in_rows(stamps_ns, there, angle_stamps_ns), there, description)

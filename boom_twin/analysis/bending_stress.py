@@ -106,9 +106,8 @@ class BendingStresses:
     """Bending moments and stresses at k stations at one instant."""
 
     moments: Array  # (k,), N m, positive where they bend the outer end up
-    moment_sigmas: Array  # standard deviations by the load at the tip, NaN without an estimate
     stresses: Array  # (k,), Pa, of the outermost fibre, with the sign of the moment
-    stress_sigmas: Array  # their standard deviations
+    stress_sigmas: Array  # standard deviations by the load at the tip, NaN without an estimate
 
 
 def section_moduli(scene: Scene, heights: Array | None = None) -> Array:
@@ -164,7 +163,7 @@ class BendingStressModel:
             influence = self.influence(drives, prediction.joints)
         if estimate is None or np.isnan(influence).any():
             nothing = np.full(len(self.stations), np.nan)
-            return BendingStresses(prediction.moments, nothing, prediction.moments / self.moduli, nothing)
+            return BendingStresses(prediction.moments, prediction.moments / self.moduli, nothing)
         moments = prediction.moments + influence @ estimate.load
         sigmas = np.sqrt(influence**2 @ estimate.load_variance)
-        return BendingStresses(moments, sigmas, moments / self.moduli, sigmas / self.moduli)
+        return BendingStresses(moments, moments / self.moduli, sigmas / self.moduli)

@@ -19,7 +19,7 @@ from ..messages.mapping import load_mapping
 from ..messages.topic_table import FRAME, Topics, every_input, factor
 from ..messages.type_store import fill_header, jazzy, new_message
 from ..scene.load import SceneSource
-from ..twin.sample_check import samples_of as samples_by_name
+from ..twin.sample_check import samples_of
 from ..types import SECOND, SENSORS, Array, Sample, Stream
 from .async_writer import FileSplit, Storage
 from .session_model import SessionSheet, scene_from
@@ -50,7 +50,7 @@ def write_samples(
                 )
 
 
-def samples_of(
+def samples_in_rows(
     stamps_ns: NDArray[np.int64], values: Mapping[Stream, Array], angle_stamps_ns: NDArray[np.int64] | None = None
 ) -> list[Sample]:
     """Return the samples of a session by stamp, from rows of readings; at equal stamps in the order of `values`.
@@ -193,7 +193,7 @@ class SessionWriter:
         UsageError
             Readings by name cannot be used, see `boom_twin.twin.sample_check.samples_of`.
         """
-        samples = samples_by_name(sample, stamp_ns, self._joints) if isinstance(sample, Mapping) else [sample]
+        samples = samples_of(sample, stamp_ns, self._joints) if isinstance(sample, Mapping) else [sample]
         for each in samples:
             topic = self._topics.inputs.get(Stream(SENSORS[each.stream].beside or each.stream))
             if topic is None:

@@ -111,7 +111,7 @@ def _cylinders(text: str | None, scene: Scene) -> list[tuple[float, float]]:
 def run(args: Namespace) -> int:
     """Simulate, sample, write."""
     from ..bag.session_model import RIG_ORIGIN, SessionSheet, scene_from
-    from ..bag.session_writer import samples_of, write_samples
+    from ..bag.session_writer import samples_in_rows, write_samples
     from ..offline.ground_truth import FILE_NAME
     from ..system.result_folder import RIG, result_folder
     from ..validation.rig import (
@@ -170,7 +170,7 @@ def run(args: Namespace) -> int:
         placed = {stream: rows for stream, rows in session.placed.items() if stream is not Stream.RATE or "gyro" in recorded}
         values = {Stream.STROKES: session.strokes, Stream.ANGLES: joints, Stream.IMU: imu, Stream.FORCES: forces, **placed}
         there = {stream: rows for stream, rows in values.items() if rows is not None}
-        write_samples(building, samples_of(session.stamps, there, session.angle_stamps), there, notes)
+        write_samples(building, samples_in_rows(session.stamps, there, session.angle_stamps), there, notes)
         # not the boom that was simulated: what a twin is to assume
         own = _mapping_text(places, cylinders)
         sheet = SessionSheet(__version__, assumed.text, mapping=own, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)

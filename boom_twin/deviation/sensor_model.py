@@ -15,7 +15,6 @@ from ..kernels.tables import JOINT_A, JOINT_B
 from ..types import Mount
 
 TURN = 2.0 * np.pi
-MOUNTS = "root", "head", "root_compensated", "head_compensated"  # of inclinometers
 
 
 @inner

@@ -65,11 +65,10 @@ class Verdict(NamedTuple):
 
 
 class Checked(NamedTuple):
-    """Result of a check. `moved` is False if the boom stood still. `expected` belongs to the best explanation."""
+    """Result of a check. `moved` is False if the boom stood still."""
 
     verdicts: tuple[Verdict, ...]
     moved: bool
-    expected: Expected
     tables: Mapping[Stream, Table]
 
     def lacks(self, verdict: Verdict) -> bool:
@@ -98,7 +97,6 @@ class _Part(NamedTuple):
 @dataclass(frozen=True)
 class _Explanation:
     strokes: tuple[Channel, ...]
-    expected: Expected
     parts: Mapping[Stream, _Part]
     cost: float
 
@@ -115,7 +113,7 @@ def check(model: RestModel, declared: Declared, window: Window, is_quick: bool =
         return None
     moved = bool((np.ptp(strokes.values, axis=0) > MOVED * np.abs(strokes.values).max()).any())
     checker = _Checker(model, declared, tables, MOVED_WEIGHT if moved else STILL_WEIGHT, is_quick)
-    return Checked(checker.verdicts(), moved, checker.found[0].expected, tables) if checker.found else None
+    return Checked(checker.verdicts(), moved, tables) if checker.found else None
 
 
 class _Checker:
@@ -198,7 +196,7 @@ class _Checker:
             imu, axes = self._tables.get(stream), self._declared[stream]
             if imu is not None and axes and all(each.name in imu.names for each in axes):
                 parts[stream] = self._gravity_part(gravity_hypotheses(imu, axes, gravity, self._weight))
-        return _Explanation(strokes, expected, parts, prior + sum(part.cost for part in parts.values()))
+        return _Explanation(strokes, parts, prior + sum(part.cost for part in parts.values()))
 
     def _part(self, stream: Stream, expected: Expected, cube_of: Callable[[], Cube]) -> _Part:
         declared, names = self._declared[stream], self._tables[stream].names

@@ -294,7 +294,7 @@ class MomentumBalance:
 
 
 def momentum_balance(course: DriveCourse, dt: float) -> MomentumBalance:
-    """Return the balance along a motion, in the steps of `boom_twin.analysis.balances.energy_balance`."""
+    """Return the balance along a motion, in the steps of `energy_balance`."""
     momenta = Momenta(course.plan, course.plan.work())
     first, before, impulse = momenta.momentum(course.start), momenta.forces(course.start, course.first_load), np.zeros(3)
     rows, gaps = [first], [np.zeros(3)]

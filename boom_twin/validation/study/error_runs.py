@@ -84,7 +84,7 @@ FEW_VARIANTS = (Own(method=Method("newmark", 0.6)), Own(method=Method(passes=1))
 
 @dataclass(frozen=True)
 class Peer:
-    """Exudyn's geometrically exact beams, generalised-alpha; see `rig.Scheme` for `kept`, `rig.exudyn` for `lumped`."""
+    """Exudyn's geometrically exact beams, generalised-alpha; see `rig.Scheme` for `kept`, `rig.linkages` for `lumped`."""
 
     step: float
     elements: int

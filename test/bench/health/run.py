@@ -32,7 +32,7 @@ from bench.record import keep
 from default_boom import with_parameters
 
 from boom_twin import Twin, load_scene
-from boom_twin.bag.session_writer import samples_of
+from boom_twin.bag.session_writer import samples_in_rows
 from boom_twin.health.alarms import Alarms
 from boom_twin.twin.blocks import block_of
 from boom_twin.types import NANO, Stream
@@ -95,7 +95,9 @@ def row_of(number: int, causes: bool = False) -> dict[str, Any]:
     twin, alarms = Twin(scene, health=True, causes=causes), Alarms()
     first = int(seen.stamps[0])
     rows = {Stream.STROKES: seen.strokes, Stream.ANGLES: seen.joints, Stream.IMU: imu, Stream.FORCES: forces}
-    samples = samples_of(seen.stamps, {stream: each for stream, each in rows.items() if each is not None}, seen.angle_stamps)
+    samples = samples_in_rows(
+        seen.stamps, {stream: each for stream, each in rows.items() if each is not None}, seen.angle_stamps
+    )
     for health in twin.take(block_of(samples, len(scene.joints))).health.values():
         alarms.take(health)
     found = []

@@ -8,7 +8,7 @@ import numpy as np
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_writer import samples_of, write_samples
+from boom_twin.bag.session_writer import samples_in_rows, write_samples
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import Output, load_topics
@@ -39,7 +39,7 @@ for stamp, row in zip(stamps.tolist(), strokes, strict=True):
 assert max(abs(row[3]) for row in sent) > 0.01
 
 rows = {Stream.STROKES: strokes, Stream.ANGLES: np.array(joints)}
-write_samples(Path("session"), samples_of(stamps, rows), rows, {"origin": "synthetic"})
+write_samples(Path("session"), samples_in_rows(stamps, rows), rows, {"origin": "synthetic"})
 options = ("--out", "result", "--no-pictures", "--no-health")
 subprocess.run([sys.executable, "-m", "boom_twin.cli.main", "replay", "session", *options], check=True)
 assert [numbers(message) for _, _, message in read(scan(Path("result/bag")), {NAME: KIND})] == sent

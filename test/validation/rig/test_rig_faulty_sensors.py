@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from recordings import samples_of
+from recordings import samples_in_rows
 
 pytest.importorskip("exudyn")
 
@@ -94,7 +94,7 @@ def test_faults_come_on_over_their_ramp_and_go(healthy):
 def test_missing_messages_are_not_there(healthy, cause, stream):
     session = spoil(healthy, [parse(f"{cause}.dropout:missing:0.5@{ONSET:g}")], 1)
     rows = {Stream.STROKES: session.strokes, Stream.ANGLES: session.joints, Stream.IMU: session.imu}
-    kept = [s for s in samples_of(session.stamps, rows, session.angle_stamps) if s.stream is stream]
+    kept = [s for s in samples_in_rows(session.stamps, rows, session.angle_stamps) if s.stream is stream]
     assert all(np.isfinite(sample.values).all() for sample in kept)
     assert len(kept) == pytest.approx(800 + 0.5 * 1200, abs=80)
 
