@@ -98,9 +98,6 @@ def increments_by_tip_force(plan: Plan, state: State, work: Work) -> Array:
     return np.column_stack([one - found[0] for one in found[1:]])
 
 
-POSTURE_STEP = 0.03  # m of stroke after which the influence of the tip's force is made anew
-
-
 @dataclass(frozen=True)
 class BendingStresses:
     """Bending moments and stresses at k stations at one instant."""
@@ -144,7 +141,8 @@ class BendingStressModel:
 
         `strokes` (n,) are of the drives, m; `joints` (n,) are angles near those of the equilibrium, rad.
         """
-        if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
+        posture_step = 0.03  # m of stroke after which the influence of the tip's force is made anew
+        if float(np.max(np.abs(strokes - self._at))) > posture_step:
             self._at = strokes.copy()
             try:
                 settle(self._plan, self._state, self._work, strokes, joints)

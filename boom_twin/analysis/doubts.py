@@ -27,7 +27,6 @@ from .drive import DriveCourse, Run
 COARSE = 0.01  # estimated error as a share of the tip's travel
 SHORTEST_PATH = 1e-3  # m of travel that an error is measured against at least
 RINGING = 1.0  # sum of the changes of acceleration over that of the accelerations: 2 if it changes sign from step to step
-QUIET = 1e-3  # m/s^2, mean acceleration below which ringing is rounding
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,8 @@ def warnings_of(deviations: Iterable[EstimatedError], cause: str, remedy: str) -
 
 def ringing(jolt: float, shake: float, square: float) -> tuple[str, ...]:
     """A sentence where the tip's acceleration changes sign from step to step; parameters as of `step_error_warning`."""
-    rings = jolt > RINGING * shake and shake > QUIET * square
+    quiet = 1e-3  # m/s^2, mean acceleration below which ringing is rounding
+    rings = jolt > RINGING * shake and shake > quiet * square
     sentence = "the accelerations change sign from step to step; take more numerical damping, a rho well below 1"
     return (sentence,) if rings else ()
 
@@ -83,16 +83,13 @@ def too_fast(times: Array, rates: Array) -> tuple[str, ...]:
 
 
 ACCELERATION, FORCE = 0.05, 0.02  # bounds of the error of acceleration and force, as shares of the largest
-LEAST_ACCELERATION = 0.02  # m/s^2 that an error is measured against at least
-LEAST_FORCE = 0.01  # likewise, of the largest force of all cylinders
-BY_STEPS = 2.0  # error over the change that a finer step makes; by halves 4/3 for smooth motions, 2 for impacts and kinks
-BY_ROWS = 1.5  # error over the change that every second row makes: 1/3 for smooth drives, 1 and more at kinks
 
 
 def step_errors(course: DriveCourse, own: Run, dt: float) -> tuple[EstimatedError, ...]:
     """Return the errors that steps of at most `dt` (s) added to the motion `own`; `differences` names the quantities."""
+    by_steps = 2.0  # error over the change that a finer step makes; by halves 4/3 for smooth motions, 2 for impacts and kinks
     rows, finer = np.arange(len(course.times)), 8 if course.plan.pins else 2
-    return _compared(course.times, own.rows, course.stepped(rows, dt, finer), BY_STEPS)
+    return _compared(course.times, own.rows, course.stepped(rows, dt, finer), by_steps)
 
 
 def row_errors(course: DriveCourse, own: Run) -> tuple[EstimatedError, ...]:
@@ -100,6 +97,7 @@ def row_errors(course: DriveCourse, own: Run) -> tuple[EstimatedError, ...]:
 
     Odd and even rows are left out in turn, because a kink shows in one way only.
     """
+    by_rows = 1.5  # error over the change that every second row makes: 1/3 for smooth drives, 1 and more at kinks
     last = len(course.times) - 1
     if last < 2:
         return ()
@@ -107,7 +105,7 @@ def row_errors(course: DriveCourse, own: Run) -> tuple[EstimatedError, ...]:
     for first in (0, 1):
         rows = np.unique(np.concatenate([[0], np.arange(first, last, 2), [last]]))
         if len(rows) <= last:
-            found.append(_compared(course.times[rows], own.rows.at(rows), course.stepped(rows, own.longest), BY_ROWS))
+            found.append(_compared(course.times[rows], own.rows.at(rows), course.stepped(rows, own.longest), by_rows))
     return tuple(max(pair, key=lambda deviation: deviation.share) for pair in zip(*found, strict=True))
 
 
@@ -129,11 +127,13 @@ def differences(times: Array, found: Results, other: Results, factor: float) -> 
 
     Both have rows at the same `times` (m,), s.
     """
+    least_acceleration = 0.02  # m/s^2 that an error is measured against at least
+    least_force = 0.01  # likewise, of the largest force of all cylinders
     (tip, acceleration), (place, rate) = ((rows.tip[:, 0, :2], rows.tip[:, 2, :2]) for rows in (found, other))
     path = max(float(_lengths(tip - tip[0]).max()), SHORTEST_PATH)
-    largest = max(float(_lengths(acceleration).max()), LEAST_ACCELERATION)
+    largest = max(float(_lengths(acceleration).max()), least_acceleration)
     sizes = np.abs(found.cylinder_forces).max(axis=0)
-    sizes = np.maximum(sizes, max(LEAST_FORCE * sizes.max(), 1.0))
+    sizes = np.maximum(sizes, max(least_force * sizes.max(), 1.0))
     forces = np.abs(other.cylinder_forces - found.cylinder_forces) / sizes
     worst = int(np.argmax(forces.max(axis=0)))
     cylinder = (f"the force of cylinder {worst + 1}", "its largest", FORCE)
@@ -186,7 +186,6 @@ def joint_doubts(scene: Scene, times: Array, joints: Array) -> Iterator[str]:
 
 
 VALID_DEFLECTION = 0.5  # validity limit of the tip deflection, as a fraction of the boom's reach
-CHECKED_INSTANTS = 8  # evenly spaced instants of a motion to check; the tip's farthest point is added
 
 
 def beyond_validity(scene: Scene, away: float) -> tuple[str, ...]:
@@ -201,7 +200,8 @@ def beyond_validity(scene: Scene, away: float) -> tuple[str, ...]:
 
 def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Array | None) -> tuple[str, ...]:
     """Return the warning of `beyond_validity` for the worst of some instants of `strokes` (m, n) and `tip` (m, 2), m."""
-    rows: NDArray[np.int64] = np.linspace(0, len(tip) - 1, CHECKED_INSTANTS).astype(np.int64)
+    checked_instants = 8  # evenly spaced instants of a motion to check; the tip's farthest point is added
+    rows: NDArray[np.int64] = np.linspace(0, len(tip) - 1, checked_instants).astype(np.int64)
     rows = np.unique(np.append(rows, np.argmax(np.hypot(*(tip - tip[0]).T))))
     worst, near = 0.0, angles
     for row in rows:

@@ -23,13 +23,7 @@ from .bending_stress import moments_by_unknowns, stations
 from .equilibrium import settle
 from .modal import natural_modes
 
-MOST_POSTURES = 700  # postures of the grid
-FINEST = 11  # angles of a joint
 FREQUENCY_COUNT = 3
-FREQUENCY_ACCURACY = 1e-5  # relative accuracy of frequencies
-STARTS = 5  # best postures of the grid from which each extreme is searched
-SEARCH_STEP = 1e-3  # of the search's differences, rad
-GAIN = 1e-4  # relative gain by which a step of the search must better the extreme
 
 
 @dataclass(frozen=True)
@@ -82,7 +76,9 @@ def envelope(scene: Scene, progress: Callable[[int, int], None] = lambda done, t
 
 
 def _grid(scene: Scene) -> list[Array]:
-    count = max(2, min(FINEST, int(MOST_POSTURES ** (1.0 / len(scene.joints)) + 1e-9)))
+    finest = 11  # angles of a joint
+    most_postures = 700  # postures of the grid
+    count = max(2, min(finest, int(most_postures ** (1.0 / len(scene.joints)) + 1e-9)))
     axes = [np.radians(np.linspace(*joint.range_deg, count)) for joint in scene.joints]
     return [np.array(angles) for angles in product(*axes)]
 
@@ -99,6 +95,7 @@ class _Boom:
 
     def at_rest(self, relative: Array, modes: int = FREQUENCY_COUNT) -> Array | None:
         """Return section angles (deg), tip, deflection, forces, moments and frequencies in one row, None at no rest."""
+        frequency_accuracy = 1e-5  # relative accuracy of frequencies
         scene, plan = self._scene, self._plan
         strokes = strokes_of_angles(scene, relative)
         if not all(0.0 <= s <= joint.cylinder.max_stroke for s, joint in zip(strokes, scene.joints, strict=True)):
@@ -107,7 +104,7 @@ class _Boom:
         state, work = plan.state(), plan.work()
         try:
             settle(plan, state, work, strokes, relative)
-            frequencies = [mode.frequency for mode in natural_modes(plan, state, work, modes, FREQUENCY_ACCURACY)]
+            frequencies = [mode.frequency for mode in natural_modes(plan, state, work, modes, frequency_accuracy)]
         except SolverError:
             self.skipped["no equilibrium"] += 1
             return None
@@ -119,6 +116,9 @@ class _Boom:
 
     def extreme(self, grid: Array, k: int, sign: float) -> Array | None:
         """Return the row of largest ``sign * row[k]`` that is found from the best of `grid`; None if none is better."""
+        gain = 1e-4  # relative gain by which a step of the search must better the extreme
+        search_step = 1e-3  # of the search's differences, rad
+        starts = 5  # best postures of the grid from which each extreme is searched
         n, values = len(self._bounds), -sign * grid[:, k]
         modes = FREQUENCY_COUNT if k >= 3 + 3 * n else 0
         best, found = values.min(), None
@@ -132,9 +132,9 @@ class _Boom:
                 best, found = value, relative.copy()
             return float(value)
 
-        for start in np.argsort(values)[:STARTS]:
+        for start in np.argsort(values)[:starts]:
             relative = np.diff(np.radians(grid[start, :n]), prepend=0.0)
-            minimize(lacking, relative, method="L-BFGS-B", bounds=self._bounds, options={"eps": SEARCH_STEP, "ftol": GAIN})
+            minimize(lacking, relative, method="L-BFGS-B", bounds=self._bounds, options={"eps": search_step, "ftol": gain})
         return None if found is None else self.at_rest(found)
 
 

@@ -92,8 +92,6 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
 TOLERANCE = 1e-9  # rad, increment in the last pass; the remaining error is its square
 PASSES = np.int64(60)  # typed, see `kernels.transfer.time_step.ANEW`
 LONGEST_INCREMENT = 0.1  # rad per pass
-FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # first and smallest load step, as fractions of gravity, if the full load fails
-LEAST_CLEARANCE_STEP = 1e-3  # smallest clearance step, as a fraction of the clearances
 
 
 @dataclass(frozen=True, repr=False)
@@ -268,13 +266,14 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
     With ideal pins the full load is tried first, then load steps. Then the clearances are introduced in the same way.
     Histories end without motion.
     """
+    first_load, least_load = 0.05, 1e-3  # first and smallest load step, as fractions of gravity, if the full load fails
     drive, where = plan.closed_lengths + strokes, ", ".join(f"{stroke:.4f}" for stroke in strokes)
     state.drives[0], state.drives[1], state.pace[0] = drive, 0.0, 0
     clamp_pins(state)
     set_undeformed(plan, state, angles)
     if not _rests(plan, state, work, drive, 1.0):
         set_undeformed(plan, state, angles)
-        share = _gradually(state, FIRST_LOAD, LEAST_LOAD, lambda share, aim: _rests(plan, state, work, drive, aim))
+        share = _gradually(state, first_load, least_load, lambda share, aim: _rests(plan, state, work, drive, aim))
         if share < 1.0:
             raise SolverError(
                 f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it keeps moving or a "
@@ -293,11 +292,12 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
 
 def _loosen_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float:
     """Follow the equilibrium from zero to full clearance, in one step if possible; return the fraction reached."""
+    least_clearance_step = 1e-3  # smallest clearance step, as a fraction of the clearances
 
     def rests(share: float, aim: float) -> bool:
         return _rests(loosen_pins(plan, state, aim, aim - share), state, work, drive, 1.0)
 
-    return _gradually(state, 1.0, LEAST_CLEARANCE_STEP, rests)
+    return _gradually(state, 1.0, least_clearance_step, rests)
 
 
 def _gradually(state: State, step: float, least: float, rests: Callable[[float, float], bool]) -> float:

@@ -17,13 +17,7 @@ import numpy as np
 from ..types import Array
 
 ORDER = 14  # eigenvalues that are looked for: two a mode, and some that take up noise
-LOWEST_HZ, HIGHEST_HZ = 0.2, 15.0
-DAMPED = 0.2  # largest damping ratio of what is taken for a mode
 DECAYS = 4.0  # deviations by which a vibration has to be damped: the line of a pump is not
-NEIGHBOURHOOD = 3.0
-"""Times the resolution, one over the length of the record: what is left so near to a frequency counts for how sure that is."""
-LONGEST_STEP = 5.0
-"""Deviations of a rate, by which least squares may move it; a longer step is not taken, for it is not linear."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +33,9 @@ class Vibration:
 
 def free_vibrations(dt: float, values: Array) -> list[Vibration]:
     """Return the modes by frequency in `values` (k, c), `dt` (s) apart; none of fewer than 3 `ORDER` rows."""
+    longest_step = 5.0  # deviations of a rate by which least squares may move it; a longer step is not linear
+    damped = 0.2  # largest damping ratio of what is taken for a mode
+    lowest_hz, highest_hz = 0.2, 15.0
     if len(values) < 3 * ORDER or not values.any():
         return []
     x = np.asarray(values - values.mean(axis=0), np.float64)
@@ -48,12 +45,12 @@ def free_vibrations(dt: float, values: Array) -> list[Vibration]:
     turns = np.linalg.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0])
     rates = np.log(turns[turns.imag > 0.0]) / dt
     frequencies, dampings = np.abs(rates) / (2.0 * pi), -rates.real / np.abs(rates)
-    kept = (frequencies > LOWEST_HZ) & (frequencies < min(HIGHEST_HZ, 0.4 / dt)) & (dampings > 0.0) & (dampings < DAMPED)
+    kept = (frequencies > lowest_hz) & (frequencies < min(highest_hz, 0.4 / dt)) & (dampings > 0.0) & (dampings < damped)
     rates = rates[kept][np.argsort(frequencies[kept])]
     if not len(rates):
         return []
     step, sigmas, amplitudes = _refined(dt * np.arange(float(len(x))), x, rates)
-    rates = rates + np.where(np.abs(step) < LONGEST_STEP * sigmas.max(axis=1), step, 0.0)
+    rates = rates + np.where(np.abs(step) < longest_step * sigmas.max(axis=1), step, 0.0)
     return [_vibration(*each) for each in zip(rates, sigmas, amplitudes, strict=True)]
 
 
@@ -85,10 +82,11 @@ def _refined(times: Array, x: Array, rates: np.ndarray) -> tuple[np.ndarray, Arr
 
 def _coloured(times: Array, rest: Array, rates: np.ndarray) -> Array:
     """Root of the spectrum of `rest` (k, c) near every rate (modes,), 1 where it is as elsewhere; at least that."""
+    neighbourhood = 3.0  # resolutions: the residual so near to a frequency counts for its deviation
     power = np.square(np.abs(np.fft.rfft(rest, axis=0)[1:])).sum(axis=1)
     lines = np.arange(1.0, len(power) + 1.0)  # of the length of the record
     length = len(times) * (times[1] - times[0])
-    near = np.abs(lines - length * np.abs(rates)[:, None] / (2.0 * pi)) < NEIGHBOURHOOD
+    near = np.abs(lines - length * np.abs(rates)[:, None] / (2.0 * pi)) < neighbourhood
     usual = max(float(power.mean()), 1e-300)
     return np.asarray(np.sqrt(np.maximum(near @ power / np.maximum(near.sum(axis=1), 1) / usual, 1.0)))
 

@@ -31,7 +31,6 @@ from .equilibrium import rest_at, strokes_and_angles
 from .modal import drive_at_rest
 
 SHAPES = 5  # least number of shapes in which a flexible part bends, see `with_all_shapes`
-LARGE = 1e4  # times a load of 1 N or 1 m: static forces and lengths are rounded to 1e-16 of themselves
 SMALL = np.array([1.0, 1e-6])  # N, m of a drive: loads that leave the tangents as they are, see `harmonic_response`
 UPWARD = (0.0, 1.0)  # N
 
@@ -187,9 +186,10 @@ class LinearisedBoom:
 
     def _linear_increments(self, rates: ComplexArray, loads: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Return `_increments` under `loads`, solved at the size of load that is best for `harmonic_response`."""
+        large = 1e4  # times a load of 1 N or 1 m: static forces and lengths are rounded to 1e-16 of themselves
         if not self.plan.pins:
-            increments, tip = self._increments(rates, LARGE * loads)
-            return increments / LARGE, tip / LARGE
+            increments, tip = self._increments(rates, large * loads)
+            return increments / large, tip / large
         limits = np.repeat(SMALL, (int(TIP_FORCE), self.plan.joints))
         sizes = np.abs(loads / limits).max(axis=1, keepdims=True)
         sizes[sizes == 0.0] = 1.0

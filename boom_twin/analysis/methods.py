@@ -143,12 +143,9 @@ def _row_count(duration: float, step: float, every: int) -> int:
 
 
 ARCH = "arch"
-ARCH_TRAVEL = (0.05, 0.0, 0.03, 0.0)  # m
 TURN = math.radians(8.0)
-HALVINGS = 4
 RISE = 1.5  # s
 DURATION = 4.0  # s
-RANGE_SAMPLES = 181  # of a joint's range
 
 
 @dataclass(frozen=True)
@@ -175,6 +172,7 @@ def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATI
     It starts in `posture`: by default `arch`, else the first posture, else next to the middle of the joints' ranges.
     UsageError if there is no such posture, or no cylinder with room to move.
     """
+    arch_travel = (0.05, 0.0, 0.03, 0.0)  # m
     name = posture or (ARCH if ARCH in scene.postures else next(iter(scene.postures), None))
     if name is None:
         angles = np.array([_middle(scene, i) for i in range(len(scene.joints))])
@@ -182,7 +180,7 @@ def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATI
     else:
         angles, first = posture_angles(scene, name), strokes_of_posture(scene, name)
     start = f"posture {name}" if name else "the middle of the ranges"
-    travel = np.array(ARCH_TRAVEL) if name == ARCH and _is_default(scene, first) else _travel(scene, angles, first)
+    travel = np.array(arch_travel) if name == ARCH and _is_default(scene, first) else _travel(scene, angles, first)
     if not travel.any():
         raise UsageError(f"the boom in {start}: no cylinder has room to move. Name another posture.")
     far = ", ".join(f"stroke {i + 1} by {1e3 * travel[i]:+.1f} mm" for i in np.flatnonzero(travel)[:6])
@@ -204,8 +202,9 @@ def _is_default(scene: Scene, first: Array) -> bool:
 
 def _middle(scene: Scene, index: int) -> float:
     """Angle (rad) of joint `index` nearest to the middle of its range that its cylinder reaches."""
+    range_samples = 181  # of a joint's range
     low, high = np.radians(scene.joints[index].range_deg)
-    grid = np.linspace(low, high, RANGE_SAMPLES)
+    grid = np.linspace(low, high, range_samples)
     strokes = stroke_curve(scene, index, grid)
     with np.errstate(invalid="ignore"):
         reached = grid[(strokes >= 0.0) & (strokes <= scene.joints[index].cylinder.max_stroke)]
@@ -216,10 +215,11 @@ def _middle(scene: Scene, index: int) -> float:
 
 def _travel(scene: Scene, angles: Array, first: Array) -> Array:
     """Travel (m) of every cylinder by the rule for booms in general, shape (n,)."""
+    halvings = 4
     travel = np.zeros(len(angles))
     for turn, i in enumerate(range(0, len(angles), 2)):
         up = 1.0 if turn % 2 == 0 else -1.0
-        sizes = [sign * TURN / 2**halving for halving in range(HALVINGS) for sign in (up, -up)]
+        sizes = [sign * TURN / 2**halving for halving in range(halvings) for sign in (up, -up)]
         aims = [_stroke_after(scene, i, float(angles[i]), size) for size in sizes]
         travel[i] = next((aim - first[i] for aim in aims if aim is not None), 0.0)
     return travel

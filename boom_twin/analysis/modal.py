@@ -22,10 +22,8 @@ from ..types import Array
 
 HIGHEST_RATE = 1e7  # rad/s, upper limit of the search
 RELATIVE_WIDTH = 1e-11  # relative width of the last bracket
-SHIFT = 1e-6  # relative shift from the frequency, for inverse iteration
 LOAD = 1e-9  # m, displacement whose inertia forces are the load there
 ABSURD = "Look for values in the scene that are too large or too small by many orders of magnitude."
-NUDGE = 1e-6  # rad, step of the derivative of positions by unknowns
 
 
 @dataclass(frozen=True)
@@ -113,13 +111,14 @@ def natural_modes(
 
 def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, lower: list[Mode]) -> Mode:
     """Return a mode by inverse iteration close to `omega`, from a random load orthogonal to the `lower` modes."""
+    shift = 1e-6  # relative shift from the frequency, for inverse iteration
     rng = np.random.default_rng(1)
     motion = rng.standard_normal(len(plan.masses)) * (plan.masses > 0.0)
     increments = np.zeros(len(plan.names))
     for _ in range(3):
         for mode in lower:
             motion = motion - mode.motion * ((plan.masses * motion) @ mode.motion)
-        increments, motion = boom.response(omega * (1.0 - SHIFT), motion), np.zeros_like(motion)
+        increments, motion = boom.response(omega * (1.0 - shift), motion), np.zeros_like(motion)
         position_change(plan.tables, state, work, state.z.copy(), increments, _nudge(plan, increments), motion)
         size = math.sqrt(float(plan.masses @ motion**2))
         if not 0.0 < size < math.inf:
@@ -129,7 +128,8 @@ def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, low
 
 
 def _nudge(plan: Plan, increments: Array) -> float:
-    return NUDGE / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)
+    nudge = 1e-6  # rad, step of the derivative of positions by unknowns
+    return nudge / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)
 
 
 def damping_ratio(plan: Plan, mode: Mode) -> float:

@@ -18,7 +18,6 @@ from .modal import natural_modes
 
 MOVED = 0.005  # m of any stroke after which all is computed anew
 COUNT = 6
-FREQUENCY_ACCURACY = 1e-4  # relative accuracy of the frequencies
 
 Found = TypeVar("Found")
 
@@ -51,9 +50,10 @@ class ModeList(PresentPosture[list[float]]):
         self._scene, self._plan = scene, compile_scene(scene)
 
     def _work_out(self, strokes: Array) -> list[float]:
+        frequency_accuracy = 1e-4  # relative accuracy of the frequencies
         state, work = self._plan.state(), self._plan.work()
         try:
             settle(self._plan, state, work, strokes, joint_angles_of_strokes(self._scene, strokes))
         except BoomTwinError:
             return []
-        return [mode.frequency for mode in natural_modes(self._plan, state, work, COUNT, FREQUENCY_ACCURACY)]
+        return [mode.frequency for mode in natural_modes(self._plan, state, work, COUNT, frequency_accuracy)]

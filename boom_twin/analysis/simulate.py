@@ -35,8 +35,6 @@ from .equilibrium import rest_at, travel_words
 from .steady_state import check_force_rows
 
 RHO = 0.8
-CLOSEST = 1e-6  # s, between rows: rounding of positions over the square of a shorter step is more than 0.01 m/s^2
-MOST_STEPS = 2e7  # of a motion, whose drive takes 64 bytes a step and cylinder
 
 
 @dataclass(frozen=True, repr=False)
@@ -256,6 +254,8 @@ def _doubts(
 
 
 def _checked(scene: Scene, times: Array, strokes: Array, dt: float, name: str) -> tuple[Array, Array]:
+    most_steps = 2e7  # of a motion, whose drive takes 64 bytes a step and cylinder
+    closest = 1e-6  # s, between rows: rounding of positions over the square of a shorter step is more than 0.01 m/s^2
     times, strokes = np.asarray(times, dtype=float), np.asarray(strokes, dtype=float)
     n = len(scene.joints)
     if not (math.isfinite(dt) and dt > 0.0):
@@ -266,15 +266,15 @@ def _checked(scene: Scene, times: Array, strokes: Array, dt: float, name: str) -
         row, column = np.argwhere(~np.isfinite(np.column_stack([times, strokes])))[0].tolist()
         where = f"{name}_{column}_m" if column else "t_s"
         raise UsageError(f"row {row + 1} of the drive, {where}: not finite. Give a number in every column.")
-    if np.any((spans := np.diff(times)) < CLOSEST):
-        row = int(np.argmax(spans < CLOSEST))
+    if np.any((spans := np.diff(times)) < closest):
+        row = int(np.argmax(spans < closest))
         where = f"t_s = {times[row + 1]:.9g} s in row {row + 2} of the drive"
         if spans[row] <= 0.0:
             raise UsageError(f"{where}: not after row {row + 1}. Sort the rows.")
-        raise UsageError(f"{where}: {spans[row]:.2g} s after row {row + 1}, {CLOSEST:g} s at least. Leave one of the two out.")
-    if (steps := (times[-1] - times[0]) / dt) > MOST_STEPS:
+        raise UsageError(f"{where}: {spans[row]:.2g} s after row {row + 1}, {closest:g} s at least. Leave one of the two out.")
+    if (steps := (times[-1] - times[0]) / dt) > most_steps:
         raise UsageError(
-            f"t_s = {times[-1]:g} s in row {len(times)} of the drive: {steps:.2g} steps of {dt:g} s, {MOST_STEPS:.2g} at most. "
+            f"t_s = {times[-1]:g} s in row {len(times)} of the drive: {steps:.2g} steps of {dt:g} s, {most_steps:.2g} at most. "
             "Give times in s, if these are in ms, us or ns; else a larger step, or the motion in pieces."
         )
     most = np.array([joint.cylinder.max_stroke for joint in scene.joints])

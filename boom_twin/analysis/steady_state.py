@@ -26,8 +26,6 @@ from .frequency_response import LinearisedBoom, linearised_boom
 
 INSTANTS = 2048
 HIGHEST_HARMONIC = 200.0  # Hz; far above what moves a boom
-PERIODS = (0.01, 2000.0)  # s, shortest and longest: the model ends at some 100 Hz, and harmonics cost time
-LARGEST_FORCE = 1e7  # N; far above what any boom bears
 NEGLIGIBLE = 1e-6
 
 
@@ -64,9 +62,10 @@ def pump_load(scene: Scene, frequency: float, height: float, change_over: float 
 
 def check_force_rows(rows: Array, what: str, names: Sequence[str]) -> None:
     """Raise UsageError unless times increase and forces are plausible; `rows` (m, 3) are time (s), x and y (N)."""
-    for row in np.flatnonzero(~(np.isfinite(rows[:, 0]) & (np.abs(rows[:, 1:]) <= LARGEST_FORCE).all(axis=1))):
+    largest_force = 1e7  # N; far above what any boom bears
+    for row in np.flatnonzero(~(np.isfinite(rows[:, 0]) & (np.abs(rows[:, 1:]) <= largest_force).all(axis=1))):
         told = ", ".join(f"{name} = {value:g}" for name, value in zip(names, rows[row], strict=True))
-        bound = f"a time must be finite, a force at most {LARGEST_FORCE:g} N"
+        bound = f"a time must be finite, a force at most {largest_force:g} N"
         raise UsageError(f"row {row + 1} of the {what}: {told}: {bound}. Put it right.")
     for row in np.flatnonzero(np.diff(rows[:, 0]) <= 0.0):
         told = f"t_s = {rows[row + 1, 0]:.9g} s in row {row + 2} of the {what}"
@@ -94,7 +93,7 @@ def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
 
 def _instants(period: float) -> Array:
     """Even instants of a period (s), an even number of them; UsageError if it is too short or too long."""
-    low, high = PERIODS
+    low, high = 0.01, 2000.0  # s: the model ends at some 100 Hz, and harmonics cost time
     if not low <= period <= high:
         raise UsageError(f"load: its period of {period:g} s must be {low:g} to {high:g} s. Give another rate.")
     count = 2 * max(INSTANTS // 2, math.ceil(HIGHEST_HARMONIC * period))
@@ -168,7 +167,6 @@ def steady_state_of(boom: LinearisedBoom, load: PeriodicLoad) -> SteadyState:
 
 
 TOO_MUCH = 1.5  # times the median swing of a posture: such rates are to be avoided
-LEAST_SWING = 1e-5  # m; less is no swing, but rounding or a boom without compliance
 
 
 @dataclass(frozen=True)
@@ -194,9 +192,10 @@ class ResonanceMap:
 
     def to_avoid(self) -> tuple[RateToAvoid, ...]:
         """The bands to avoid, posture by posture, ascending in rate."""
+        least_swing = 1e-5  # m; less is no swing, but rounding or a boom without compliance
         found = []
         for name, swing, harmonics in zip(self.postures, self.swing, self.harmonics, strict=True):
-            above = np.concatenate([[False], swing > max(TOO_MUCH * float(np.median(swing)), LEAST_SWING), [False]])
+            above = np.concatenate([[False], swing > max(TOO_MUCH * float(np.median(swing)), least_swing), [False]])
             starts, stops = np.flatnonzero(above[1:] & ~above[:-1]), np.flatnonzero(above[:-1] & ~above[1:])
             for start, stop in zip(starts, stops, strict=True):
                 peak = start + int(np.argmax(swing[start:stop]))

@@ -151,7 +151,6 @@ def _values(session: Session, name: str) -> list[Any]:
 NAMING_TIME = 5_000_000_000  # log time (ns) from the first message of strokes or angles, in which all names are read
 
 KINDS = {stream: kind.named for stream, kind in SENSORS.items() if kind.is_named and not kind.ends}
-NAMES_TOLD = 12  # limit for the number of names in a sentence
 
 
 DRIVE_REMEDY = (
@@ -214,8 +213,9 @@ def _scene(source: str) -> str:
 
 
 def _listed(names: Iterable[str]) -> str:
+    names_told = 12  # limit for the number of names in a sentence
     first = list(dict.fromkeys(names))
-    return ", ".join(first[:NAMES_TOLD]) + (f" and {len(first) - NAMES_TOLD} more" if len(first) > NAMES_TOLD else "")
+    return ", ".join(first[:names_told]) + (f" and {len(first) - names_told} more" if len(first) > names_told else "")
 
 
 def _counted(number: int, kind: str) -> str:

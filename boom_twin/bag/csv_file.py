@@ -22,7 +22,6 @@ from ..types import SECOND, SENSORS, Stream, stream_of
 from .import_session import Readings, encoded_blocks, read_tables, readings_of
 from .session_file import SessionFile, channel_of, schema_of
 
-ROWS_TO_JUDGE, SLOWEST_STEP = 20, 1.0  # rows; s from row to row, by which times in another unit are known
 _REMEDY = "`boom_twin import` reads files with other columns, units and times."
 
 
@@ -44,6 +43,7 @@ class CsvFile(SessionFile):
 
 def summarise(path: Path) -> CsvFile:
     """Return the content of one file. A BagError names a column or value that cannot be used, and its line."""
+    rows_to_judge, slowest_step = 20, 1.0  # rows; s from row to row, by which times in another unit are known
     try:
         open_received(path).close()
     except OSError as error:
@@ -56,7 +56,7 @@ def summarise(path: Path) -> CsvFile:
         raise BagError(f"{path}: {read[0].rows.remark} by an import. {_REMEDY}")
     stamps = read[0].times.stamps
     step = float(np.median(np.diff(stamps))) / SECOND if len(stamps) > 1 else 0.0
-    if read[0].times.is_local or (len(stamps) >= ROWS_TO_JUDGE and step >= SLOWEST_STEP):
+    if read[0].times.is_local or (len(stamps) >= rows_to_judge and step >= slowest_step):
         told = f"{read[0].times.words}, by {step:g} s from row to row"
         raise BagError(f"{path}: {told}: t_s in seconds is needed, several rows a second. {_REMEDY}")
     readings = readings_of(assignment, read, topics, assignment.joints)

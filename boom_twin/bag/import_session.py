@@ -31,7 +31,6 @@ from .session_writer import BY_NAME, LogTimes, named_message
 from .writer import MessageWriter
 
 TOGETHER = 4096  # messages encoded at once
-WHOLE_SHARE = 0.5  # share of complete rows of a stream below which each message has only the channels of its row
 
 
 class ReadTable(NamedTuple):
@@ -188,6 +187,7 @@ def _readings(
     assignment: Assignment, number: int, rows: LogRows, stamps: Stamps, topics: Topics, joints: int
 ) -> list[Readings]:
     """Return the readings of one table in the units of the mapping."""
+    whole_share = 0.5  # share of complete rows of a stream below which each message has only the channels of its row
     uses = {use.channel: use for use in assignment.used if use.table == number}
     found, clock = list[Readings](), LogTimes()
     logs = np.array([clock.at(stamp) for stamp in stamps.tolist()])
@@ -204,7 +204,7 @@ def _readings(
                 values[:, column] = readings if unit == sensor.unit else readings * (units[unit] / units[sensor.unit])
         there = np.isfinite(values[:, own])
         filled = there.any(axis=1)
-        is_apart = bool(there.all(axis=1).sum() < WHOLE_SHARE * filled.sum())
+        is_apart = bool(there.all(axis=1).sum() < whole_share * filled.sum())
         found.append(Readings(stream, logs[filled], stamps[filled], values[filled], own, is_apart))
     return found
 

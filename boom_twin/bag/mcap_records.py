@@ -38,11 +38,10 @@ KINDS: dict[int, Any] = {
 }
 """Classes of all records but messages and chunks."""
 
-_WINDOW = 2**27  # window limit of zstd, as on its command line without --long
-
 
 def _zstd(data: bytes, limit: int) -> bytes:
-    return ZstdDecompressor(max_window_size=_WINDOW).stream_reader(data).read(limit)
+    window = 2**27  # window limit of zstd, as on its command line without --long
+    return ZstdDecompressor(max_window_size=window).stream_reader(data).read(limit)
 
 
 def _lz4(data: bytes, limit: int) -> bytes:

@@ -158,11 +158,8 @@ def offered_qos(qos: Qos) -> list[dict[str, Any]]:
     ]
 
 
-DEEPEST = 10_000  # limit for the depth of a QoS profile that is read
-
 _RELIABILITY = {1: "reliable", 2: "best_effort", "reliable": "reliable", "best_effort": "best_effort"}
 _DURABILITY = {1: "transient_local", 2: "volatile", "transient_local": "transient_local", "volatile": "volatile"}
-_LONGEST = 100_000  # characters of YAML in one entry
 
 
 def profiles(value: Any) -> list[Qos]:
@@ -170,9 +167,10 @@ def profiles(value: Any) -> list[Qos]:
 
     `value` is ``offered_qos_profiles`` of ``metadata.yaml`` or of a channel: a list, or YAML of one.
     """
+    longest = 100_000  # characters of YAML in one entry
     if isinstance(value, str):
         try:
-            value = plain(value) if len(value) <= _LONGEST else []
+            value = plain(value) if len(value) <= longest else []
         except ValueError:
             return []
     found = [_profile(entry) for entry in (value if isinstance(value, list) else []) if isinstance(entry, dict)]
@@ -180,12 +178,13 @@ def profiles(value: Any) -> list[Qos]:
 
 
 def _profile(entry: dict[Any, Any]) -> Qos | None:
+    deepest = 10_000  # limit for the depth of a QoS profile that is read
     try:
         return Qos.model_validate(
             {
                 "reliability": _RELIABILITY.get(entry.get("reliability"), "reliable"),
                 "durability": _DURABILITY.get(entry.get("durability"), "volatile"),
-                "depth": min(max(int(entry.get("depth") or 1), 1), DEEPEST),
+                "depth": min(max(int(entry.get("depth") or 1), 1), deepest),
             }
         )
     except (ValidationError, TypeError, ValueError):

@@ -23,8 +23,6 @@ from ..messages.cdr_decoder import MessageBlock, by_log_time, joined
 from ..messages.type_store import decode, jazzy
 from ..types import NANO
 
-NEVER = 2**64 - 1  # log time after all others, ns
-
 
 @dataclass(frozen=True, slots=True)
 class TimeWindow:
@@ -70,14 +68,14 @@ class TimeWindow:
 
     def bounds(self, first: int) -> tuple[int, int]:
         """Return the first log time (ns) in the window and the first one after it, for a session that begins at `first`."""
-        begin = min(NEVER, first + round(self.start / NANO))
-        return begin, NEVER if self.duration is None else min(NEVER, begin + round(self.duration / NANO))
+        never = 2**64 - 1  # log time after all others, ns
+        begin = min(never, first + round(self.start / NANO))
+        return begin, never if self.duration is None else min(never, begin + round(self.duration / NANO))
 
 
 WHOLE = TimeWindow()  # window of the whole session
 
 
-TOGETHER = 2000  # messages in one block of a file that is read message by message
 CDR = "cdr"
 REMEDY = "The file is damaged or was cut off: `boom_twin recover BAG --out DIR` saves what is whole."
 
@@ -155,8 +153,9 @@ class SessionFile(ABC):
 
         `sources` of a block holds channel numbers. This default requires that `heads` yields messages by log time.
         """
+        together = 2000  # messages in one block of a file that is read message by message
         found = (each for each in self.heads() if each[0] not in passed)
-        while group := list(islice(found, TOGETHER)):
+        while group := list(islice(found, together)):
             sources, times, data = zip(*group, strict=True)
             ends = np.cumsum([len(each) for each in data])
             starts = np.concatenate([[0], ends[:-1]])

@@ -197,7 +197,6 @@ def incompleteness(path: Path) -> str:
 DEFAULT_MAPPING = "default mapping"
 DEFAULT_PARAMETERS = "default parameters"
 GIVEN = "given as a Scene"  # source of a scene that came by no file
-LENGTHS_SINCE = 0, 2  # first version of the virtual rig whose transducers read lengths
 
 
 @dataclass(frozen=True)
@@ -314,6 +313,7 @@ def strokes_of(session: Path | None, mapped: Mapped) -> SessionStrokes:
     It is angles if the mapping says so, else what stroke transducers read. The mapping's ``reads`` comes first, then
     ``strokes`` of ``session.yaml``. The default is lengths. It is drives for the virtual rig before version 0.2.
     """
+    lengths_since = 0, 2  # first version of the virtual rig whose transducers read lengths
     if mapped.topics.drive == "angles":
         return SessionStrokes(StrokeReading.ANGLE, f"{mapped.source}, drive")
     if told := mapped.topics.inputs[Stream.STROKES].reads:
@@ -327,6 +327,6 @@ def strokes_of(session: Path | None, mapped: Mapped) -> SessionStrokes:
     path = None if session is None else sheet_path(session)
     version = str(_value(path, "boom_twin", "")) if path and _value(path, "origin", "") == RIG_ORIGIN else ""
     made = re.match(r"(\d{1,9})\.(\d{1,9})", version)
-    if made and (int(made[1]), int(made[2])) < LENGTHS_SINCE:
+    if made and (int(made[1]), int(made[2])) < lengths_since:
         return SessionStrokes(StrokeReading.DRIVE, f"made by the virtual rig of version {version}")
     return SessionStrokes(StrokeReading.LENGTH, "nothing else is said; for drives give reads: drive in a mapping")

@@ -25,8 +25,6 @@ from .async_writer import FileSplit, Storage
 from .session_model import SessionSheet, scene_from
 from .writer import BagWriter, MessageWriter, recorded
 
-_UNKNOWN = -1.0  # first element of a covariance: the quantity is not measured (REP-145)
-
 
 def write_samples(
     directory: Path, samples: Iterable[Sample], streams: Iterable[Stream], description: Mapping[str, str]
@@ -69,6 +67,7 @@ def samples_in_rows(
 
 def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
     """Return the message that a rig's sensor sends. An Imu has the acceleration in the plane, and the `rate` (1,) if given."""
+    unknown = -1.0  # first element of a covariance: the quantity is not measured (REP-145)
     kind = SENSORS[sample.stream]
     msg = new_message(kind.message)
     if not kind.is_named:
@@ -77,9 +76,9 @@ def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
             msg.point.x, msg.point.z = map(float, sample.values)
             return msg
         msg.orientation.w = 1.0
-        msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = _UNKNOWN
+        msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = unknown
         if kind.beside:
-            rate, msg.linear_acceleration_covariance[0] = sample.values, _UNKNOWN
+            rate, msg.linear_acceleration_covariance[0] = sample.values, unknown
         else:
             msg.linear_acceleration.x, msg.linear_acceleration.z = map(float, sample.values)
         if rate is not None:
@@ -94,7 +93,6 @@ def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
 
 CLOCK_SET = SECOND  # step back of a stamp (ns) above which a clock was set; a smaller one is a late row
 BY_NAME = "sensor_msgs/msg/JointState"
-CHECK_PERIOD = 0.5  # time (s) between two checks of the disk
 
 
 class LogTimes:
@@ -193,6 +191,7 @@ class SessionWriter:
         UsageError
             Readings by name cannot be used, see `boom_twin.twin.sample_check.samples_of`.
         """
+        check_period = 0.5  # time (s) between two checks of the disk
         samples = samples_of(sample, stamp_ns, self._joints) if isinstance(sample, Mapping) else [sample]
         for each in samples:
             topic = self._topics.inputs.get(Stream(SENSORS[each.stream].beside or each.stream))
@@ -205,7 +204,7 @@ class SessionWriter:
             data, log = bytes(jazzy().serialize_cdr(message, topic.type)), self._log.at(each.stamp)
             self._storage.put(self._keys[topic.absolute], log, data, log, self._counts[topic.absolute])
         if (now := time.monotonic()) > self._due:
-            self._due = now + CHECK_PERIOD
+            self._due = now + check_period
             self._storage.check()
 
     def __enter__(self) -> Self:

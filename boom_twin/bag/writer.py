@@ -49,10 +49,6 @@ LARGEST_MESSAGE = MOST_HELD - 2**20
 """Size limit of a message, bytes. Its chunk holds topic and type, too, and must be readable."""
 
 
-METADATA_PAUSE = 10.0
-"""Pause between two writings of ``metadata.yaml`` at splits, as a multiple of the writing time, which grows with every file."""
-
-
 class BagWriter:
     """Writer of a bag; `close` completes it, `abandon` leaves it as it is.
 
@@ -149,11 +145,12 @@ class BagWriter:
 
     def split(self) -> None:
         """Complete the open file and begin the next one. Update ``metadata.yaml`` unless its last update was too recent."""
+        metadata_pause = 10.0  # between two writings of ``metadata.yaml``, in writing times, which grow with every file
         with self._as_bag_error():
             self._finish()
             if (began := time.monotonic()) >= self._due:
                 self._write_metadata()
-                self._due = began + (1.0 + METADATA_PAUSE) * (time.monotonic() - began)
+                self._due = began + (1.0 + metadata_pause) * (time.monotonic() - began)
         self._open()
 
     def close(self) -> None:

@@ -176,7 +176,6 @@ COLUMNS = (
 )  # fmt: skip
 TRENDS = ("residual_rms_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
 """First part of the names of figures that are drawn over time."""
-MAX_TRENDS = 24
 
 
 def write_page(path: Path, rows: Sequence[Row], rigs: Sequence[RigSummary]) -> None:
@@ -256,6 +255,7 @@ def _with_unit(name: str) -> str:
 
 def _trends(rows: Sequence[Row], summaries: Sequence[RigSummary], folder: Path) -> Iterator[dict[str, object]]:
     """Yield name, drifts and picture in `folder` of wear-related figures over time, for every rig with several sessions."""
+    max_trends = 24
     by_name = {rig.rig: rig for rig in summaries}
     rigs: dict[str, list[Row]] = {}
     for row in rows:
@@ -264,7 +264,7 @@ def _trends(rows: Sequence[Row], summaries: Sequence[RigSummary], folder: Path) 
     for number, (rig, found) in enumerate(sorted(rigs.items())):
         found.sort(key=lambda row: int(row["first_stamp_ns"]))
         names = sorted({name for row in found for name in row if name.startswith(TRENDS) and not name.endswith("_sigma")})
-        trends = [trend for name in names if len((trend := _trend(name, found)).values) > 1][:MAX_TRENDS]
+        trends = [trend for name in names if len((trend := _trend(name, found)).values) > 1][:max_trends]
         if trends:
             picture = folder / f"{number}.png"
             trends_picture(picture, rig, trends)

@@ -32,9 +32,6 @@ if TYPE_CHECKING:
     from ..config.settings import Settings
     from ..scene.schema import Scene
 
-LOOK_PERIOD = 0.1  # seconds between two measurements of the memory
-STDERR_BYTES = 2000  # number of last bytes of a process's stderr that are reported
-
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -51,6 +48,7 @@ def run_supervised(command: Sequence[str], task: bytes, seconds: float, memory: 
     Stdin stays open: its end shows the process that its caller has ended. The process leads a group of its own, and all of
     the group is ended with it. It may take so many `seconds`, and with all its children so much resident `memory`, bytes.
     """
+    stderr_bytes = 2000  # number of last bytes of a process's stderr that are reported
     with TemporaryFile() as out, TemporaryFile() as told:
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=out, stderr=told, start_new_session=True)
         assert process.stdin is not None
@@ -67,7 +65,7 @@ def run_supervised(command: Sequence[str], task: bytes, seconds: float, memory: 
                 process.stdin.close()
         out.seek(0)
         if not reason and code:
-            told.seek(max(0, told.seek(0, os.SEEK_END) - STDERR_BYTES))
+            told.seek(max(0, told.seek(0, os.SEEK_END) - stderr_bytes))
             lines = told.read().decode(errors="replace").strip().splitlines()
             cause = f"signal {-code}" if code < 0 else f"itself with code {code}"
             reason = lines[-1] if lines and code > 0 else f"its process was ended by {cause}"
@@ -76,10 +74,11 @@ def run_supervised(command: Sequence[str], task: bytes, seconds: float, memory: 
 
 def _watch(process: subprocess.Popen[bytes], seconds: float, memory: int) -> tuple[str, int]:
     """Wait for the end of a process. Return the limit that it passed (empty if none) and its largest observed memory, bytes."""
+    look_period = 0.1  # seconds between two measurements of the memory
     end, peak = time.monotonic() + seconds, 0
     while True:
         with suppress(subprocess.TimeoutExpired):
-            process.wait(LOOK_PERIOD)
+            process.wait(look_period)
             return "", peak
         peak = max(peak, _memory(process.pid))
         if peak > memory:
@@ -228,8 +227,6 @@ def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: Tim
 
 REMEDY = 'Run `pip install "boom_twin[batch]"`.'
 KILLED = "the workers that had it were ended from outside. Look for what ends them, as the system's memory."
-COUNT_PERIOD = 5  # seconds between two counts of a cluster's workers
-CONNECT_TIMEOUT = 20.0  # seconds for a scheduler to answer
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,6 +245,7 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
     `workers` is the number of sessions at once on this machine, by default that of its cores. UsageError if Dask is not
     installed, BagError if no scheduler answers there.
     """
+    connect_timeout = 20.0  # seconds for a scheduler to answer
     if scheduler is None:
         count = workers or os.cpu_count() or 1
         yield Workers(run_task, lambda: count)
@@ -257,7 +255,7 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
     except ImportError:
         raise UsageError(f"dask is not installed, and --scheduler needs it. {REMEDY}") from None
     try:
-        client = Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)
+        client = Client(scheduler, timeout=connect_timeout, set_as_default=False)
     except (TimeoutError, OSError, ValueError) as error:
         remedy = "Start `dask scheduler`, check host and port."
         raise BagError(f"--scheduler {scheduler}: no Dask scheduler answers ({type(error).__name__}). {remedy}") from None
@@ -295,6 +293,7 @@ def rows_of(workers: Workers, tasks: Sequence[SessionTask]) -> Iterator[Row]:
     A scheduler gets no more tasks than its workers have threads. When a worker ends, Dask counts that against every task
     that waits there, not only against the running one. Workers that join later are used, too.
     """
+    count_period = 5  # seconds between two counts of a cluster's workers
     waiting, rows, threads = deque(tasks), SimpleQueue[Row](), list[Thread]()
 
     def go() -> None:
@@ -314,7 +313,7 @@ def rows_of(workers: Workers, tasks: Sequence[SessionTask]) -> Iterator[Row]:
                     threads.append(Thread(target=go, daemon=True))  # sessions end with this process, see end_with_caller
                     threads[-1].start()
                 try:
-                    row = rows.get(timeout=COUNT_PERIOD)
+                    row = rows.get(timeout=count_period)
                 except Empty:
                     continue
             yield row

@@ -95,9 +95,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
 }
 """Examples that the help of each command ends with: arguments of `boom_twin`."""
 
-# New objects between two searches for garbage. Modules hold none, and looking through those of numba again and again takes
-# 0.05 s, once more at the exit 0.09 s: hence also gc.freeze().
-COLLECT_AFTER = 100_000
 
 DESCRIPTION = "Digital twin of a concrete placing boom."
 EXIT_CODES = "exit codes: 0 done, 1 the input or the run failed (the reason is on stderr), 2 usage"
@@ -145,10 +142,13 @@ class Command(Protocol):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code; without `argv` that of the process, which has nothing else to do."""
+    # New objects between two searches for garbage. Modules hold none, and looking through those of numba again and again takes
+    # 0.05 s, once more at the exit 0.09 s: hence also gc.freeze().
+    collect_after = 100_000
     if argv is not None:
         return _main(argv)
     open_closed_streams()
-    gc.set_threshold(COLLECT_AFTER)
+    gc.set_threshold(collect_after)
     try:
         return _main(sys.argv[1:])
     finally:

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from ..ros.bag.subscriptions import RequestedTopic
 
 
-SMALLEST_FILE = 2**20  # bytes
-SHORTEST_FILE = 0.1  # s
 _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
 
 
@@ -166,18 +164,20 @@ def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:
 
 def long_enough(text: str) -> float:
     """Parse the length of a file in seconds."""
+    shortest_file = 0.1  # s
     value = positive(text)
-    if value < SHORTEST_FILE:
-        raise ArgumentTypeError(f"{text}: must be at least {SHORTEST_FILE:g} s: completing a file takes a while")
+    if value < shortest_file:
+        raise ArgumentTypeError(f"{text}: must be at least {shortest_file:g} s: completing a file takes a while")
     return value
 
 
 def size(text: str) -> int:
     """Parse a number of bytes, with k, M or G for powers of 1024."""
+    smallest_file = 2**20  # bytes
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([kMG]?)B?", text)
     if match is None:
         raise ArgumentTypeError(f"{text!r} is not a size like 500M or 2G")
     value = int(float(match[1]) * _UNITS[match[2]])
-    if value < SMALLEST_FILE:
+    if value < smallest_file:
         raise ArgumentTypeError(f"{text}: must be at least 1M: every file repeats the definitions")
     return value

@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from ..bag.recover import Recovery
 
 
-SHOWN = 20  # faults that are printed one by one
-
-
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap; only read")
     parser.add_argument("--out", required=True, metavar="DIR", help="directory of the new session, new or empty")
@@ -27,11 +24,13 @@ def run(args: Namespace) -> int:
     """Save a sound session, and print what was saved and what was lost."""
     from ..bag.recover import recover
 
+    shown = 20  # faults that are printed one by one
+
     outcome = recover(Path(args.bag), Path(args.out))
-    for path, fault in outcome.faults[:SHOWN]:
+    for path, fault in outcome.faults[:shown]:
         tell(f"{path}: bytes {fault.offset} to {fault.offset + fault.length}: {fault.reason}")
-    if outcome.fault_count > SHOWN:
-        tell(f"and {outcome.fault_count - SHOWN} faults more")
+    if outcome.fault_count > shown:
+        tell(f"and {outcome.fault_count - shown} faults more")
     values = as_json(outcome, args.out)
     print_result(args.json, values, as_text(outcome, values))
     return 0

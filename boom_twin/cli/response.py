@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
 Flags = NDArray[np.bool_]
 LOW, HIGH, POINTS, RATES = 0.05, 30.0, 300, (0.2, 1.2, 201)
-FASTEST_PUMP = 2.0  # Hz, of pumps
-SWING_SHARE = 0.05  # of the reach: swings beyond are not in proportion to the load
-SWING_WORN = 1e-4  # m, the same on pins with clearance
 
 
 @dataclass(frozen=True)
@@ -126,9 +123,11 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     from ..analysis.frequency_response import UPWARD, frequency_response, with_all_shapes
     from ..plots.analysis import response_picture
 
+    modes_sought = 40  # natural frequencies that are looked for within the band
+
     if not 0.0 < args.low < args.high < float("inf"):
         raise UsageError(f"--from {args.low:g} --to {args.high:g}: frequencies must be above 0 Hz and ascend. Give such.")
-    rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=MODES_SOUGHT)
+    rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=modes_sought)
     natural = rest.frequencies[(rest.frequencies > args.low) & (rest.frequencies < args.high)]
     force = None if args.drive is not None else tuple(args.tip or UPWARD)
     place = args.strokes, args.posture, force, args.drive
@@ -157,7 +156,6 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     )
 
 
-MODES_SOUGHT = 40  # natural frequencies that are looked for within the band
 BESIDE, SHARP = 1.0 + 1e-6, 3.0
 """Times a natural frequency; a peak that is so much higher than there is bounded by rounding alone."""
 
@@ -190,11 +188,13 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
     from ..analysis.steady_state import load_of_rows, pump_load, steady_state
     from ..plots.analysis import steady_state_picture
 
+    fastest_pump = 2.0  # Hz, of pumps
+
     if args.pump:
-        if args.pump[0] > FASTEST_PUMP:
+        if args.pump[0] > fastest_pump:
             remedy = f"{args.pump[0]:g} a minute are {args.pump[0] / 60.0:.3g} Hz, and the rate comes first: --pump 0.35:130."
             raise UsageError(
-                f"--pump rate = {args.pump[0]:g} Hz: a pump makes at most {FASTEST_PUMP:g} strokes a second. {remedy}"
+                f"--pump rate = {args.pump[0]:g} Hz: a pump makes at most {fastest_pump:g} strokes a second. {remedy}"
             )
         load, told = pump_load(scene, *args.pump), f"pump pulses of {args.pump[1]:g} N at {args.pump[0]:g} Hz"
     else:
@@ -275,10 +275,12 @@ def _map(scene: Scene, args: Namespace) -> Answer:
 
 def _large(scene: Scene, swing: float) -> tuple[str, ...]:
     """Return a warning if the swing is so large that the boom does not respond in proportion."""
-    if scene.clearance is not None and scene.clearance.pins and swing > SWING_WORN:
-        told = f"the largest swing is {swing:.2g} m; beyond {SWING_WORN:g} m journals may roll in their bushes or leave them"
+    swing_share = 0.05  # of the reach: swings beyond are not in proportion to the load
+    swing_worn = 1e-4  # m, the same on pins with clearance
+    if scene.clearance is not None and scene.clearance.pins and swing > swing_worn:
+        told = f"the largest swing is {swing:.2g} m; beyond {swing_worn:g} m journals may roll in their bushes or leave them"
         return (f"{told}, and a boom on pins with clearance does not answer in proportion. Simulate it",)
-    if swing > SWING_SHARE * scene.reach:
-        share = f"more than {SWING_SHARE:g} of the reach, beyond which no boom answers in proportion"
+    if swing > swing_share * scene.reach:
+        share = f"more than {swing_share:g} of the reach, beyond which no boom answers in proportion"
         return (f"the largest swing, {swing:.2g} m, is {share}",)
     return ()

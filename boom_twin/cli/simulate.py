@@ -21,10 +21,7 @@ from .output import open_scene, print_result, warn
 if TYPE_CHECKING:
     from ..analysis.simulate import Simulation
 
-POSTURE_DEVIATION = 1e-3  # m, largest deviation of the first row from the posture's strokes
-FASTEST_CYLINDER = 0.5  # m/s, speed above which a warning comes; booms stay below 0.3
 FORCE_COLUMNS = ("t_s", "tip_fx_N", "tip_fy_N")
-SPARSE_ROWS = 1.0  # s between rows, above which a warning comes
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -132,17 +129,19 @@ def _columns(table: CsvTable, names: Sequence[str]) -> Array:
 
 def odd_in_drive(times: Array, strokes: Array, stem: str = "stroke") -> list[str]:
     """Return warnings, with place and remedy, of probable input errors: times in ms, strokes that jump."""
+    sparse_rows = 1.0  # s between rows, above which a warning comes
+    fastest_cylinder = 0.5  # m/s, speed above which a warning comes; booms stay below 0.3
     steps, found = np.diff(times), []
     if not len(steps) or not (steps > 0.0).all():
         return []  # `simulate` refuses it
-    if (usual := float(np.median(steps))) >= SPARSE_ROWS:
+    if (usual := float(np.median(steps))) >= sparse_rows:
         found.append(
             f"t_s goes on by {usual:g} s from row to row, {times[-1] - times[0]:g} s in all, and strokes go smoothly between. "
             "If these are ms, divide them by 1000: t_s is in seconds."
         )
     speeds = np.abs(np.diff(strokes, axis=0)) / steps[:, None]
     row, i = np.unravel_index(np.argmax(speeds), speeds.shape)
-    if speeds[row, i] > FASTEST_CYLINDER:
+    if speeds[row, i] > fastest_cylinder:
         found.append(
             f"line {row + 3}: {stem}_{i + 1}_m goes {strokes[row, i]:g} to {strokes[row + 1, i]:g} within {steps[row]:g} s, "
             f"{speeds[row, i]:.3g} m/s; cylinders of booms go at less than 0.3 m/s. Check the value and the times."
@@ -155,14 +154,16 @@ def _angles_near(scene: Scene, posture: str, first: Array, are_lengths: bool) ->
     from ..analysis.equilibrium import drives_at_rest
     from ..scene.kinematics import posture_angles, strokes_of_posture
 
+    posture_deviation = 1e-3  # m, largest deviation of the first row from the posture's strokes
+
     expected, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
     drives = drives_at_rest(scene, first, angles) if are_lengths else first
     off = np.abs(expected - drives)
-    if not np.max(off) <= POSTURE_DEVIATION:
+    if not np.max(off) <= posture_deviation:
         i = int(np.argmax(off))
         at_rest = " at rest" if are_lengths else ""
         raise UsageError(
             f"stroke_{i + 1}_m = {drives[i]:.6g} in the first row{at_rest}: posture {posture} has {expected[i]:.6g}, and they "
-            f"may differ by {POSTURE_DEVIATION:g} m. Start in the posture, or name another."
+            f"may differ by {posture_deviation:g} m. Start in the posture, or name another."
         )
     return angles

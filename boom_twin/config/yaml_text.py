@@ -26,7 +26,6 @@ LARGEST_FILE = 4 * 2**20
 MOST_VALUES = 50_000
 """Limit for the number of values in a file, with aliases expanded."""
 DEEPEST = 20
-LINE_WIDTH = 120  # characters of a line in an edited text
 
 TAG = "tag:yaml.org,2002:"
 TYPED = {"int": "whole number", "float": "number", "bool": "true or false", "null": "empty value"}
@@ -221,8 +220,9 @@ def with_values(text: str, changes: Iterable[tuple[Place, Any]]) -> str:
     changes : iterable of (place, value)
         New plain values; None removes a key. Missing blocks on the way to a place are added.
     """
+    line_width = 120  # characters of a line in an edited text
     yaml, stream = YAML(), StringIO()
-    yaml.preserve_quotes, yaml.width = True, LINE_WIDTH
+    yaml.preserve_quotes, yaml.width = True, line_width
     root, indent, offset = load_yaml_guess_indent(text, yaml=yaml)
     if root is None:
         root = CommentedMap()

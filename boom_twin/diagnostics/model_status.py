@@ -23,7 +23,6 @@ FAILURE_SHOWN = 1.0  # time (s) for which a failure is shown
 LOAD_WINDOW = 40 * SECOND  # ns, window of loads at the tip
 SWING_WINDOW = 4 * SECOND  # ns, window of displacements of the tip: four periods of a slow boom
 INTERVAL = SECOND // 50  # ns, least time between two values of a window
-MEGA = 1e6
 Item = TypeVar("Item")
 
 
@@ -320,8 +319,8 @@ def stress_status(
     columns = found.moments, found.stresses, found.stress_sigmas
     for station, moment, stress, sigma in zip(model.stations, *columns, strict=True):
         name = f"{station.key}_m"
-        megapascals = {f"{name}_MPa": float(stress) / MEGA, f"{name}_sigma_MPa": float(sigma) / MEGA}
+        megapascals = {f"{name}_MPa": float(stress) / 1e6, f"{name}_sigma_MPa": float(sigma) / 1e6}
         judge.note({f"{name}_Nm": float(moment)} | megapascals)
     most = int(abs(found.stresses).argmax())
-    judge.note({"largest_MPa": float(found.stresses[most]) / MEGA, "largest_at": model.stations[most].name})
+    judge.note({"largest_MPa": float(found.stresses[most]) / 1e6, "largest_at": model.stations[most].name})
     return judge.finish("bending stress of all stations")

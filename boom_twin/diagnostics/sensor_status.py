@@ -17,8 +17,6 @@ from ..texts import alarm_text
 from ..types import NANO, SENSORS, Array, Mount, Sample, Stream
 from .levels import Bounds, ComponentJudge, Status
 
-LONGEST_PAUSE = 10.0  # longest step of stamps (s) that is a pause of the sensor; a longer one is a jump of its clock
-
 
 @dataclass(frozen=True, slots=True)
 class ChannelStats:
@@ -46,11 +44,12 @@ class Channel:
 
         `refused` further messages had no usable value; `longest` (s) is the largest permitted step of stamps.
         """
+        longest_pause = 10.0  # longest step of stamps (s) that is a pause of the sensor; a longer one is a jump of its clock
         messages, usable = len(values) + refused, np.isfinite(values)
         stamps, values, steps = stamps[usable], values[usable], np.zeros(0)
         if len(values):
             steps = np.diff(stamps, prepend=self._stamp or stamps[0]) * NANO
-            steps = steps[(steps > 0.0) & (steps <= LONGEST_PAUSE)]
+            steps = steps[(steps > 0.0) & (steps <= longest_pause)]
             changes = np.flatnonzero(np.diff(values, prepend=self._value) != 0.0)  # also the first reading ever
             self._unchanged = len(values) - 1 - int(changes[-1]) if len(changes) else self._unchanged + len(values)
             self._value, self._stamp = float(values[-1]), int(stamps[-1])
@@ -135,7 +134,6 @@ class StreamWatch:
 
 
 SLOW = 2.0  # largest step of stamps that is no gap at any rate, in sampling periods
-RANGE_MARGIN = 5.0  # tolerance of a sensor's range, in standard deviations of its noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +161,7 @@ def sensors_of(
     Ranges are those of `boom_twin.health.sensor_check.sensor_ranges`. `required` has the inputs that the twin reads, True if
     it needs them. `absent` are channels without a sensor.
     """
+    range_margin = 5.0  # tolerance of a sensor's range, in standard deviations of its noise
     found = {}
     ranges = sensor_ranges(scene, mounts)
     for stream, kind in SENSORS.items():
@@ -170,7 +169,7 @@ def sensors_of(
         if is_required is None or kind.gives:
             continue
         sigma, resolution = settings.noise(kind)
-        unit, over = kind.unit_suffix, RANGE_MARGIN * sigma
+        unit, over = kind.unit_suffix, range_margin * sigma
         bounds = zip(kind.channels(len(scene.joints)), *(bound.tolist() for bound in ranges[stream]), strict=True)
         found[stream] = [
             SensorSpec(

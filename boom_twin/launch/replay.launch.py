@@ -50,7 +50,6 @@ ARGUMENTS = [
     DeclareLaunchArgument("record", default_value="", description="new folder to record the session into; empty: none"),
 ]
 PLAYER = ("rate", "start", "wait")  # arguments of the player alone; all but these and ``bag`` are passed to ``twin.launch.py``
-LAST = 3.0  # time after the end of the session for node and recorder to take the last messages, s
 KEPT = {"scene": "scene:=FILE", "mapping": "mapping:=FILE"}  # files that the session keeps, and the argument that replaces each
 
 
@@ -86,9 +85,10 @@ def kept_files(bag: Path, names: list[str]) -> dict[str, str]:
 
 def player(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     """Return the player of the session's inputs and clock, which waits for the node and for the recorder, if any."""
+    last = 3.0  # time after the end of the session for node and recorder to take the last messages, s
     bag, record = (LaunchConfiguration(name).perform(context) for name in ("bag", "record"))
     options = [part for name in (*PLAYER, "namespace") for part in (f"--{name}", LaunchConfiguration(name).perform(context))]
     command = python_command("boom_twin.cli.main", "play", bag, "--clock", *options)
     command += ["--listeners", "2" if record else "1"]
-    over = TimerAction(period=LAST, actions=[Shutdown(reason="the session has been played")])
+    over = TimerAction(period=last, actions=[Shutdown(reason="the session has been played")])
     return [ExecuteProcess(cmd=command, name="play", output="screen", on_exit=[over])]

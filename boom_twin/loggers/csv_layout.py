@@ -180,7 +180,6 @@ SEPARATORS = {"\t": "tab", ";": ";", ",": ",", "|": "|"}
 """Names of separators in order of trial: first tab and ; (never decimal marks)."""
 BLANKS = NOTHING | {"--", "---", "-nan", "1.#qnan", "-1.#ind", "#nv", "#wert!", "#div/0!", "#num!", "#value!", "inf", "-inf"}
 """Texts of cells without a value, in lower case."""
-NUMERIC_SHARE = 0.6  # least share of numbers and times among the filled cells of a numeric column
 _NUMBER = re.compile(r"[+-]?(\d[\d'. ]*([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE)
 _MOMENT = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}.*|.*\d{1,2}:\d{2}.*")
 _GROUPING = re.compile(r"(?<=\d)[ '\u00a0\u202f](?=\d{3})")
@@ -297,8 +296,9 @@ def _recognised(names: list[str], units: Mapping[int, str]) -> int:
 
 
 def _is_numeric(cells: list[str]) -> bool:
+    numeric_share = 0.6  # least share of numbers and times among the filled cells of a numeric column
     filled = [cell for cell in cells if cell.lower() not in BLANKS]
-    return bool(filled) and sum(map(_is_value, filled)) >= NUMERIC_SHARE * len(filled)
+    return bool(filled) and sum(map(_is_value, filled)) >= numeric_share * len(filled)
 
 
 def _is_value(cell: str) -> bool:

@@ -153,9 +153,6 @@ class Axes(NamedTuple):
     linear_acceleration_covariance: tuple[Any]
 
 
-MOST_HEADS = 8  # number of heads kept for one topic: a bus may send every joint in a message of its own
-
-
 class CdrDecoder:
     """Decoder of the messages of one topic. The frame and the names of a message are decoded when they are new.
 
@@ -172,6 +169,7 @@ class CdrDecoder:
 
         Raise ValueError, or what `decode` raises, if the message is not whole.
         """
+        most_heads = 8  # number of heads kept for one topic: a bus may send every joint in a message of its own
         is_imu = self._type == TYPES[Stream.IMU]
         is_little = data[:2] == _LITTLE and (is_imu or self._type == TYPES[Stream.STROKES])
         found = None
@@ -187,7 +185,7 @@ class CdrDecoder:
         if found is None and is_little:
             frame, place = _string(data, _HEAD, _LENGTHS["<"])
             text, end = (frame, place) if is_imu else names_in(data)
-            self._heads = [(data[_HEAD:end], end, text), *self._heads[: MOST_HEADS - 1]]
+            self._heads = [(data[_HEAD:end], end, text), *self._heads[: most_heads - 1]]
         return stamp, msg
 
     def read_many(self, block: MessageBlock) -> tuple[Integers, Any] | None:

@@ -13,7 +13,6 @@ from ..types import SECOND, Array, Sample, Stream
 
 LONGEST_CYCLE = SECOND  # ns between stamps of one cycle; a twin needs several strokes a second
 CONTESTED_FOR = SECOND  # ns without a contradiction, after which a stream has one source again
-APART = 10.0  # difference of two sources at one stamp, over the change of each of them since the stamp before
 
 
 class Reading(NamedTuple):
@@ -130,8 +129,9 @@ class SampleAssembler:
 
 def _are_of_two(before: list[Sample], newest: list[Sample]) -> bool:
     """Return True if pairs of samples at two stamps are of two sources, and not of one whose stamps are coarse."""
+    apart = 10.0  # difference of two sources at one stamp, over the change of each of them since the stamp before
     if len(before) < 2 or len(newest) < 2:
         return False
     (a, b), (c, d) = ((pair[0].values, pair[-1].values) for pair in (before, newest))
     across, *along = (np.fmax.reduce(np.abs(x - y), initial=0.0) for x, y in ((c, d), (c, a), (d, b)))
-    return bool(across > APART * max(along))
+    return bool(across > apart * max(along))

@@ -21,7 +21,6 @@ LATEST = 2**31 * SECOND  # first stamp beyond the range of a message, ns
 
 MOST_NAMES = 1000  # limit for the number of names in a message; a machine has some tens of them
 
-KEPT = 16  # number of lists of names that are remembered for one stream: a bus may send every joint in a message of its own
 
 NO_MEASUREMENT = -1.0  # first element of a covariance where the quantity is not measured (REP-145)
 
@@ -78,11 +77,12 @@ class _Channels:
 
     def look(self, names: tuple[str, ...]) -> _Named:
         """Return the channels among `names`."""
+        kept = 16  # lists of names remembered for one stream: a bus may send every joint in a message of its own
         if names not in self._known:
             counts = Counter(names)
             places = [names.index(name) if name and counts[name] == 1 else -1 for name in self.names]
             twice = {name for name in self.names if name and counts[name] > 1}
-            if len(self._known) >= KEPT:
+            if len(self._known) >= kept:
                 self._known.clear()
             lacking = [name for name, place in zip(self.names, places, strict=True) if name and place < 0]
             beyond = self._topics.beyond(self._stream, len(self.names), counts)

@@ -25,7 +25,6 @@ PADDING = 12
 back a buffer of estimated size, not what Fast CDR has filled of it. The estimate aligns the elements of a sequence of doubles
 also where there are none, which is 4 bytes each; a JointState has three. They are not initialised.
 """
-_ENCAPSULATION = 4  # bytes before the first field; the second one says in which order bytes are
 _ORDERS = (b"\x00\x00", b"\x00\x01")
 
 
@@ -41,9 +40,6 @@ def other_than_jazzy(types: Typesdict) -> list[str]:
     return [name for name, (_, fields) in types.items() if name in known and list(known[name][1]) != list(fields)]
 
 
-MOST_TEXTS = 100  # texts of a message that may be in another encoding than UTF-8
-
-
 def text_in(data: bytes) -> str:
     """Return a text in UTF-8, or with a question mark for every byte beyond ASCII if it is in another encoding."""
     try:
@@ -57,21 +53,23 @@ def decode(data: bytes, type_name: str) -> Any:
 
     The `Typestore`'s own decoder takes 3 bytes. Raise SerdeError if the message is not whole, or more stands behind it.
     """
+    most_texts = 100  # texts of a message that may be in another encoding than UTF-8
+    encapsulation = 4  # bytes before the first field; the second one says in which order bytes are
     if data[:2] not in _ORDERS:
         raise SerdeError(f"{type_name} begins with the bytes {data[:2].hex()!r}: only 0000 and 0001, plain CDR, can be read.")
     store = jazzy()
     kind = store.get_msgdef(type_name)
     read = kind.deserialize_cdr_le if data[1] else kind.deserialize_cdr_be
-    for left in reversed(range(MOST_TEXTS)):
+    for left in reversed(range(most_texts)):
         try:
-            message, size = read(data[_ENCAPSULATION:], 0, kind.cls, store)
+            message, size = read(data[encapsulation:], 0, kind.cls, store)
             break
         except (struct.error, ValueError) as error:
             if not isinstance(error, UnicodeDecodeError) or not left:
                 raise SerdeError(f"{type_name} of {len(data)} bytes is not whole: {error}") from error
             old = struct.pack("<I" if data[1] else ">I", len(error.object) + 1) + error.object
             data = data.replace(old, old[:4] + text_in(error.object).encode(), 1)
-    end = _ENCAPSULATION + size
+    end = encapsulation + size
     if len(data) > end + PADDING:
         behind = f"{len(data) - end} bytes stand behind its last field, which ends at byte {end}"
         raise SerdeError(f"{type_name} of {len(data)} bytes: {behind}; publishers leave up to {PADDING} there.")

@@ -108,7 +108,6 @@ class AccessControl:
 
 REQUEST_TIME = 5.0  # timeout (s) of a connection's first complete request, and of each further one
 LATE = f"it sent no request within {REQUEST_TIME:g} s"
-LOGGED_LENGTH = 200  # largest length of a logged error message
 MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64  # largest number of silent or accepted connections: in total, and of one address
 
 
@@ -190,10 +189,11 @@ class Connection(web.RequestHandler):
 
         An invalid request is logged in one line, a disconnected peer is not.
         """
+        logged_length = 200  # largest length of a logged error message
         if isinstance(exc, ConnectionError):
             return web.Response(status=status)
         if status == HTTPStatus.BAD_REQUEST:
-            LOG.warning("no request from %s: %s", self.address, printable(str(message)[:LOGGED_LENGTH], keep=""))
+            LOG.warning("no request from %s: %s", self.address, printable(str(message)[:logged_length], keep=""))
             response: web.StreamResponse = web.Response(status=status, text=message)
             response.force_close()
         else:

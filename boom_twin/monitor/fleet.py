@@ -32,7 +32,6 @@ from .data.topic_rows import COMPARED, ESTIMATE, ESTIMATE_COLUMNS, RESIDUALS
 LOG = logging.getLogger("boom_twin.monitor.webhook")
 MAX_WAITING = 100  # largest number of waiting messages; one more replaces the oldest
 PAUSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # pauses (s) before further attempts
-POST_TIME = 10.0  # timeout (s) of one attempt
 CLOSING_TIME = 2.0  # time (s) for waiting messages when the monitor ends
 TRY_AGAIN = (HTTPStatus.REQUEST_TIMEOUT, HTTPStatus.TOO_EARLY, HTTPStatus.TOO_MANY_REQUESTS)
 """Status codes below 500 after which another attempt may succeed."""
@@ -79,7 +78,8 @@ class Webhook:
                 self._give_up(self._waiting.get_nowait(), "the monitor ends")
 
     async def _post_all(self) -> None:
-        async with ClientSession(timeout=ClientTimeout(total=POST_TIME)) as session:
+        post_time = 10.0  # timeout (s) of one attempt
+        async with ClientSession(timeout=ClientTimeout(total=post_time)) as session:
             while True:
                 message = await self._waiting.get()
                 reason = "the monitor ends"

@@ -25,18 +25,16 @@ from .data.store import Store
 from .server import Server, serving
 from .viewer import ACTS, ViewerActions
 
-CAPACITY = 150_000  # rows kept of every table: twelve minutes at 200 Hz
-MOST_WAITING = 20_000  # largest number of waiting samples; beyond it the oldest are dropped
-MOST_AT_ONCE = 200  # largest number of samples in one poll, so that pages are served
-
 
 class SourceFeed(Feed):
     """Feed from a twin in this process: another thread calls `put`, the server `poll`."""
 
     def __init__(self, twin: Twin, topics: Topics) -> None:
-        super().__init__("live", Store(CAPACITY), topics, twin.scene)
+        most_waiting = 20_000  # largest number of waiting samples; beyond it the oldest are dropped
+        capacity = 150_000  # rows kept of every table: twelve minutes at 200 Hz
+        super().__init__("live", Store(capacity), topics, twin.scene)
         self._view = TwinView(self, topics, twin)
-        self._waiting: deque[tuple[Sample, Report]] = deque(maxlen=MOST_WAITING)
+        self._waiting: deque[tuple[Sample, Report]] = deque(maxlen=most_waiting)
 
     def put(self, sample: Sample, report: Report) -> None:
         """Queue a sample and its report for the next poll."""
@@ -44,7 +42,8 @@ class SourceFeed(Feed):
 
     def poll(self) -> None:
         """Show the waiting samples."""
-        for _ in range(min(len(self._waiting), MOST_AT_ONCE)):
+        most_at_once = 200  # largest number of samples in one poll, so that pages are served
+        for _ in range(min(len(self._waiting), most_at_once)):
             self._view.took(*self._waiting.popleft())
 
     def now(self) -> float:

@@ -23,7 +23,6 @@ from .viewer import Viewer, ViewerActions
 PAGE = Path(__file__).parent / "page"
 MAX_VIEWERS = 16
 MAX_REQUEST_BYTES = 4096  # largest request of a page, bytes
-POLL_PERIOD = 1.0 / 60.0  # seconds between two polls of the feed
 ALARM_PERIOD = 1.0  # seconds between two looks for changes of alarms
 HEARTBEAT = 60.0  # seconds without an answer after which the connection of a viewer is closed
 
@@ -101,9 +100,10 @@ class Server:
                     await task
 
     async def _poll(self) -> None:
+        poll_period = 1.0 / 60.0  # seconds between two polls of the feed
         while True:
             self._feed.poll()
-            await asyncio.sleep(POLL_PERIOD)
+            await asyncio.sleep(poll_period)
 
     async def _follow_alarms(self) -> None:
         while True:

@@ -23,17 +23,12 @@ from .data.status import MAX_ALARMS
 from .data.store import Table
 from .protocol import ROWS, alarms, dump, layout, pack, state
 
-PERIOD = 1.0 / 30.0  # seconds between two messages of rows
-STATE_PERIOD = 0.5
 SPECTRUM_PERIOD = 1.0
 CHUNK = 8000  # largest number of rows in a block
-BEHIND = 5.0  # largest delay (s) of a page; beyond it, older rows are skipped
 HISTORY = 600.0  # seconds of data that a page gets when it opens or seeks
 NEWEST_ROW_ONLY = "shape"  # table of which only the newest row is sent
-MAX_REQUESTS = 40  # largest number of requests of a page in a second
 
 
-NOTE_LENGTH = 500  # largest number of characters of a note
 NO_TEXT = ("Cc", "Cs")  # unicode categories that cannot be published: control characters and surrogates
 ACTS = ("mark", "acknowledge")
 
@@ -56,9 +51,10 @@ class ViewerActions:
         return {"kind": "answer", "do": name, "done": True, "words": self._acts[name](request)}
 
     def _mark(self, request: dict[str, Any]) -> str:
+        note_length = 500  # largest number of characters of a note
         note = request.get("note")
-        if not isinstance(note, str) or len(note) > NOTE_LENGTH or any(category(sign) in NO_TEXT for sign in note):
-            raise ValueError(f"a note is a text of at most {NOTE_LENGTH} characters, none of them a control character")
+        if not isinstance(note, str) or len(note) > note_length or any(category(sign) in NO_TEXT for sign in note):
+            raise ValueError(f"a note is a text of at most {note_length} characters, none of them a control character")
         self._feed.publish(f"mark: {note}")
         return f"marked: {note}"
 
@@ -92,7 +88,9 @@ class Viewer:
     # -- out ----------------------------------------------------------------------------------------------------------
 
     async def _send(self) -> None:
-        feed, told = self._feed, -STATE_PERIOD
+        state_period = 0.5
+        period = 1.0 / 30.0  # seconds between two messages of rows
+        feed, told = self._feed, -state_period
         await self._send_text(
             {
                 "kind": "hello",
@@ -112,11 +110,11 @@ class Viewer:
             last = now
             await self._restart_if_cleared()
             newest = feed.store.statuses(position)
-            if newest is not statuses or now - told >= STATE_PERIOD:
+            if newest is not statuses or now - told >= state_period:
                 statuses, told = newest, now
                 await self._send_state(position)
             await self._send_rows(position)
-            await asyncio.sleep(max(0.0, PERIOD - (time.monotonic() - now)))
+            await asyncio.sleep(max(0.0, period - (time.monotonic() - now)))
 
     async def _restart_if_cleared(self) -> None:
         store = self._feed.store
@@ -159,12 +157,13 @@ class Viewer:
                 await self._socket.send_bytes(b"".join(blocks))
 
     def _unsent(self, table: Table, position: float) -> tuple[int, int]:
+        behind = 5.0  # largest delay (s) of a page; beyond it, older rows are skipped
         end = table.count if self._playback is None else table.until(position)
         first = self._sent.get(table.name)
         if first is None:
             first = table.until(position - HISTORY)
-        elif self._playback is None and (end - first > CHUNK or position - _time_of(table, first) > BEHIND):
-            first = table.until(position - BEHIND)
+        elif self._playback is None and (end - first > CHUNK or position - _time_of(table, first) > behind):
+            first = table.until(position - behind)
         if table.name == NEWEST_ROW_ONLY:
             first = max(first, end - 1)
         return max(first, table.first), end
@@ -200,12 +199,13 @@ class Viewer:
     # -- in -----------------------------------------------------------------------------------------------------------
 
     async def _receive(self) -> None:
+        max_requests = 40  # largest number of requests of a page in a second
         second, count = 0.0, 0
         async for message in self._socket:
             now = time.monotonic()
             second, count = (now, 1) if now - second > 1.0 else (second, count + 1)
             try:
-                if count > MAX_REQUESTS or message.type is not WSMsgType.TEXT:
+                if count > max_requests or message.type is not WSMsgType.TEXT:
                     raise ValueError("too many requests, or not text")
                 answer = self._do(json.loads(message.data))
             except (ValueError, TypeError, KeyError, RecursionError, OverflowError):

@@ -28,9 +28,6 @@ from ..wiring.readings import Channel, Lag, RestModel, Series, Window, is_checke
 from .session_samples import SessionSamples
 
 LOOK = 60.0  # s of a session that `wiring_of` reads
-LATE = 0.01  # s, smallest lag that is proposed as `delay`
-MOST_LAG = 0.08  # s, largest lag that the filter is left to estimate
-SIGMAS = 4.0  # standard deviations required to accept a lag
 AXES = "x", "y", "z"
 
 UNTIMED = {Stream.STROKES, *NO_LAG}
@@ -80,7 +77,9 @@ def wiring_of(bag: Path, scene: SceneSource | SessionScene, mapping: str | Path 
 
 def is_late(lag: Lag) -> bool:
     """Return True if a lag is sure and large enough to be proposed."""
-    return abs(lag.lag) > max(LATE, SIGMAS * lag.sigma)
+    sigmas = 4.0  # standard deviations required to accept a lag
+    late = 0.01  # s, smallest lag that is proposed as `delay`
+    return abs(lag.lag) > max(late, sigmas * lag.sigma)
 
 
 def commission(
@@ -108,6 +107,7 @@ def commission(
     UsageError
         Scene or mapping have faults.
     """
+    most_lag = 0.08  # s, largest lag that the filter is left to estimate
     session = scan(Path(bag))
     own, given = scene_of(session.path, scene), None if mapping is None else Path(mapping)
     joints = len(own.scene.joints)
@@ -138,7 +138,7 @@ def commission(
         sensing = topics.noise_of(settings), mounts, False, reads, topics.absent
         twin = Twin(own.scene, *sensing, places=topics.places, lagging=topics.lagging)
         lags = _lags(twin, session, topics, window, found)
-        near = [stream for stream, lag in lags.items() if abs(lag.lag) < MOST_LAG and lag.sigma < math.inf]
+        near = [stream for stream, lag in lags.items() if abs(lag.lag) < most_lag and lag.sigma < math.inf]
         for _ in range(2):  # the second pass estimates lags of late streams only; the others give the time
             twin = Twin(own.scene, *sensing, places=topics.places, lagging=dict.fromkeys([*topics.lagging, *near]))
             for block in _samples(session, topics, window, joints):
@@ -149,7 +149,7 @@ def commission(
             if is_late(lag) and stream not in topics.lagging:
                 delay = round(topics.inputs[stream].delay + lag.lag, 3)
                 entry = document.setdefault("inputs", {}).setdefault(stream.value, {})
-                entry["delay"] = "auto" if abs(delay) < MOST_LAG else delay
+                entry["delay"] = "auto" if abs(delay) < most_lag else delay
     return Commissioning(found, document, lags, absent)
 
 

@@ -51,7 +51,6 @@ def _natural(history: History, scene: Scene) -> Array:
 
 POSTURES = 9  # postures of a session whose natural frequencies are computed
 MOST_ROWS = 2**15  # rows of predictions, and of each stream's residuals, beyond which they are thinned out: 2.7 min at 200 Hz
-MOST_SHAPES = 1024  # shapes of the boom that are kept, of which pictures show two dozen
 PREDICTED = (
     "stamps_s", "tip_displacement", "tip_position", "tip_acceleration", "joints", "cylinder_forces", "strokes", "moments",
     "slow_moments",
@@ -139,11 +138,12 @@ class _Shapes:
 
     def add(self, found: list[tuple[float, Array]]) -> None:
         """Append shapes."""
+        most_shapes = 1024  # shapes of the boom that are kept, of which pictures show two dozen
         numbered = enumerate(found, self._count)
         self._chosen += [(number, shape) for number, shape in numbered if number % self._step == 0]
         self._count += len(found)
         self._newest = found[-1:] or self._newest
-        while len(self._chosen) > MOST_SHAPES:
+        while len(self._chosen) > most_shapes:
             self._step *= 2
             self._chosen = [each for each in self._chosen if each[0] % self._step == 0]
 

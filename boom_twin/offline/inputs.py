@@ -148,8 +148,6 @@ def _has_rates(session: Session, topic: InputTopic, wanted: list[str]) -> bool:
     return first is not None and first[2].angular_velocity_covariance[0] != NO_MEASUREMENT
 
 
-JUDGED_TIME = 5_000_000_000  # window (ns) of the test
-FEWEST_RESIDUALS = 10  # least number of a joint's residuals in the window
 LARGEST_RESIDUAL = radians(10.0)  # largest residual by sag, load, wrong stiffness, and most encoders' zeros
 
 
@@ -181,22 +179,24 @@ class OtherBoom:
 
     def take(self, stamp: int, values: Iterable[Array], residuals: Iterable[Array]) -> str:
         """Take rows of angles and of their residuals (n,) in rad up to a `stamp` (ns); return the same as `took`."""
+        judged_time = 5_000_000_000  # window (ns) of the test
         if self.is_judged:
             return ""
         self._values.extend(values)
         self._residuals.extend(residuals)
         self._begin = self._begin or stamp
-        return self.judge() if stamp - self._begin > JUDGED_TIME else ""
+        return self.judge() if stamp - self._begin > judged_time else ""
 
     def judge(self) -> str:
         """Return the evidence of another boom, empty without evidence; clear the window."""
+        fewest_residuals = 10  # least number of a joint's residuals in the window
         values, residuals = self._values, self._residuals
         self._begin, self._values, self._residuals = 0, [], []
-        if self.is_judged or len(values) < FEWEST_RESIDUALS or len(residuals) < FEWEST_RESIDUALS:
+        if self.is_judged or len(values) < fewest_residuals or len(residuals) < fewest_residuals:
             return ""
         table, off = np.array(values), np.array(residuals)
         counts = np.isfinite(off).sum(axis=0)
-        heard = [i for i in range(len(counts)) if counts[i] >= FEWEST_RESIDUALS]
+        heard = [i for i in range(len(counts)) if counts[i] >= fewest_residuals]
         live = [i for i in heard if np.nanmax(table[:, i]) > np.nanmin(table[:, i])]
         if 2 * len(live) <= len(heard):
             return ""

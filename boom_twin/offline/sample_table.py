@@ -19,7 +19,6 @@ from ..twin.blocks import CODES, Integers, SampleBlock
 from ..types import NANO, SENSORS, USUAL_STREAMS, Array, Stream, channels_of
 from .recording import Stretch
 
-DELAY = 2.0  # time (s) that a row waits for late residuals
 ESTIMATED = (
     "tip_x_m", "tip_y_m", "tip_angle_rad", "tip_vx_m_s", "tip_vy_m_s", "tip_angular_velocity_rad_s",
     "tip_ax_m_s2", "tip_ay_m_s2", "tip_angular_acceleration_rad_s2", "load_x_N", "load_y_N",
@@ -142,6 +141,7 @@ class SampleTable:
 
     def add(self, stretch: Stretch) -> None:
         """Add the next stretch; rows restart where a clock was set back over earlier stamps."""
+        delay = 2.0  # time (s) that a row waits for late residuals
         stamps, rows, residuals = stretch.predictions.stamps, self._new_rows(stretch), stretch.block.residuals
         for part in np.split(np.arange(len(stamps)), np.flatnonzero(np.diff(stamps) <= 0) + 1):
             if len(self._stamps) and stamps[part[0]] <= self._stamps[-1]:
@@ -153,7 +153,7 @@ class SampleTable:
                 self._fill(self._measured, block.streams, block.stamps, block.values)
             self._fill(self._residuals, residuals.streams, residuals.stamps, residuals.values)
         self._ahead = stretch.samples[-2:]  # the rows of a block may come in two stretches
-        self._write(int(np.searchsorted(self._stamps, self._stamps[-1] - round(DELAY / NANO))))
+        self._write(int(np.searchsorted(self._stamps, self._stamps[-1] - round(delay / NANO))))
 
     def finish(self) -> None:
         """Write the rest."""

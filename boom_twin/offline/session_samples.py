@@ -26,12 +26,6 @@ from ..scene.schema import Scene
 from ..twin.blocks import CODES, Integers, ReportBlock, SampleBlock, block_of, samples_in
 from ..types import SENSORS, Array, Change, Sample, Stream
 
-CHANGE_SPAN = 2_000_000_000
-"""Nanoseconds, of log time and of stamps, within which a change and its stroke sample are looked for.
-
-A looped session repeats stamps; a stray stamp is far from its stream.
-"""
-
 
 class Changes:
     """Changes of a session, each to be repeated before the stroke sample at which it took effect.
@@ -58,9 +52,10 @@ class Changes:
         return bool(self._waiting)
 
     def _begins(self, logged: int, change: Change, log: int, stamp: int) -> bool:
-        if abs(log - logged) > CHANGE_SPAN:
+        change_span = 2_000_000_000  # ns, of log time and of stamps; a looped session repeats stamps
+        if abs(log - logged) > change_span:
             return log > logged
-        return stamp == change.stamp or self._before < change.stamp < stamp < change.stamp + CHANGE_SPAN
+        return stamp == change.stamp or self._before < change.stamp < stamp < change.stamp + change_span
 
 
 def recorded_changes(session: Session, topics: Topics) -> Changes:
@@ -73,9 +68,6 @@ def recorded_changes(session: Session, topics: Topics) -> Changes:
     if info is None or info.count == 0:
         return Changes([])
     return Changes((log, decode_changes(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
-
-
-BATCH = 400  # messages in one block, at least
 
 
 class SessionSamples:
@@ -98,6 +90,7 @@ class SessionSamples:
         After a block comes one None for each of its messages that could not be used. Raise BagError if the session cannot be
         read.
         """
+        batch = 400  # messages in one block, at least
         heard, session = self._topics.heard, self._session
         changes = recorded_changes(session, self._topics)
         types = {name: self._topics.inputs[heard[name][0]].type for name in self._wanted}
@@ -107,14 +100,14 @@ class SessionSamples:
         for block in blocks:
             first = 0
             while first < len(block):
-                part = block.chosen(slice(first, first + (1 if changes.are_left else BATCH)))
+                part = block.chosen(slice(first, first + (1 if changes.are_left else batch)))
                 if changes.are_left and drive in streams[part.sources[0]]:
                     for change in changes.due(int(part.log_times[0]), stamp_in(part.data(0)) or 0):
                         yield from self._batch()
                         yield change
                 self._take(blocks, part, wires, streams)
                 first, count = first + len(part), count + len(part)
-                if count >= BATCH:
+                if count >= batch:
                     count = 0
                     yield from self._batch()
         self._keep([(0, each) for each in self._decoder.assembler.rest()], [])
@@ -173,8 +166,6 @@ class SessionSamples:
 
 
 ITEMS_AHEAD = 8  # blocks of samples, or of reports, that wait between two threads
-SWITCH_INTERVAL = 2e-5
-"""Time (s) that a thread keeps the interpreter's lock while another waits; a call of the twin's kernel takes 1 ms."""
 Item = TypeVar("Item")
 
 
@@ -182,7 +173,7 @@ Item = TypeVar("Item")
 def quick_switches() -> Iterator[None]:
     """Shorten the switch interval of threads, so that the twin does not wait for the decoder of messages."""
     usual = sys.getswitchinterval()
-    sys.setswitchinterval(SWITCH_INTERVAL)
+    sys.setswitchinterval(2e-5)  # s that a thread keeps the interpreter's lock; a call of the twin's kernel takes 1 ms
     try:
         yield
     finally:

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 
 COLOURS = {"kN": ORANGE, "Hz": GREEN, "kN m": PURPLE, "MPa": SKY}  # colours of bars, by unit
-GAP = 16.0  # pixels between a bar, its words and the edge
-LEAST_BAR_WIDTH = 0.1  # of the width, that is left for bars however long the words are
 
 
 def envelope_picture(path: Path, scene: Scene, found: Envelope, ranges: list[tuple[str, Array]]) -> None:
@@ -87,12 +85,14 @@ def _bars(axes: Axes, found: Envelope, own: list[tuple[str, Array]], unit: str) 
 
 def _make_room(axes: Axes, labels: list[Annotation]) -> None:
     """Set limits of x between which bars and labels, left and right of their ends, fit into the width of drawn axes."""
+    least_bar_width = 0.1  # of the width, that is left for bars however long the words are
+    gap = 16.0  # pixels between a bar, its words and the edge
     width = axes.get_window_extent().width
     ends = np.array([label.xy[0] for label in labels])
-    room = np.array([label.get_window_extent().width + GAP for label in labels])
+    room = np.array([label.get_window_extent().width + gap for label in labels])
     sides = np.array([-1.0 if label.get_horizontalalignment() == "right" else 1.0 for label in labels])
     span = float(np.ptp(ends)) or 1.0
-    for share in np.linspace(1.0, LEAST_BAR_WIDTH, 50):  # of the width, for what the bars span
+    for share in np.linspace(1.0, least_bar_width, 50):  # of the width, for what the bars span
         reach = ends + sides * room * span / (share * width)
         if np.ptp(reach) <= span / share:
             break

@@ -89,9 +89,7 @@ def section_parts(scene: Scene, bones: Skeleton, i: int) -> list[tuple[Array, Ar
 
 
 POSITIONS = 5  # of a joint, ends of its range included
-CURVE = 361  # angles
 COLUMNS = 3
-SLENDER = 0.07  # width of a drawn barrel over its closed length
 NOTE = "blue: lowest angle, orange: highest; section before along x"
 
 
@@ -140,6 +138,8 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
     """Draw one position of a joint's mechanism; name its pins, with a bright outline, if `colour` is given."""
     from matplotlib.patheffects import withStroke
 
+    slender = 0.07  # width of a drawn barrel over its closed length
+
     joint, alpha = bones.joints[i], 0.12 if colour is None else 0.4
     draw_section(axes, section_parts(scene, bones, i), scene.sections[i].depth, alpha)
     if i > 0:
@@ -150,7 +150,7 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
         axes.plot(*np.transpose([joint.barrel_pin, joint.rod_pin]), color=PALE, linewidth=3.0, zorder=4)
         return
     length = scene.joints[i].cylinder.closed_length
-    draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, length, SLENDER * length)
+    draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, length, slender * length)
     for name, pin in named_pins(joint).items():
         draw_pin(axes, pin, 5.0, colour)
         axes.annotate(
@@ -160,8 +160,9 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
 
 
 def _stroke(axes: Axes, scene: Scene, i: int) -> None:
+    curve = 361  # angles
     joint = scene.joints[i]
-    degrees = np.linspace(*joint.range_deg, CURVE)
+    degrees = np.linspace(*joint.range_deg, curve)
     axes.axhspan(0.0, joint.cylinder.max_stroke, color=PALE, alpha=0.5, linewidth=0, label="0 to max_stroke")
     axes.plot(degrees, stroke_curve(scene, i, np.radians(degrees)), color=INK)
     axes.axhline(0.0, color=GREY, linewidth=0.8)

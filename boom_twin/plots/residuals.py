@@ -181,9 +181,6 @@ def _distribution(axes: Axes, found: ResidualDistribution) -> None:
         axes.text(0.98, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=11, color=INK)
 
 
-SHORTEST_SPECTRUM = 4.0  # s; no spectrum of less
-
-
 def spectrum_picture(path: Path, session: str, history: History, note: str) -> None:
     """Write ``spectrum.png``: specific force if there is an IMU, else tip acceleration."""
     found = distributions_of(history)
@@ -216,7 +213,8 @@ def _modes(axes: Axes, natural: Array) -> None:
 
 def has_spectrum(history: History) -> bool:
     """Return True if the session is long enough for a spectrum."""
-    return bool(len(history.stamps_s) > 16 and history.stamps_s[-1] - history.stamps_s[0] >= SHORTEST_SPECTRUM)
+    shortest_spectrum = 4.0  # s; no spectrum of less
+    return bool(len(history.stamps_s) > 16 and history.stamps_s[-1] - history.stamps_s[0] >= shortest_spectrum)
 
 
 def _curve(found: Density) -> tuple[Array, Array]:

@@ -39,7 +39,6 @@ ENLARGED_SPAN = 6.0  # s shown enlarged
 TRUTH: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (3, 4))}
 COLOURS = (BLUE, ORANGE)  # of x and y; a prediction is a broad pale line, an estimate a thin dark one over it
 BROAD: dict[str, Any] = {"linewidth": 3.2, "alpha": 0.4}
-BAND = 2.0  # standard deviations that are shaded, as their label says
 
 
 def replay_pictures(
@@ -134,6 +133,7 @@ def _at(stamps: Array, at: Array, values: Array) -> Array:
 
 
 def _over_session(axes: Axes, history: History, panel: Panel) -> None:
+    band = 2.0  # standard deviations that are shaded, as their label says
     extents, errors = [], []
     if panel.predicted is not None:
         stamps, drawn = broken(history.stamps_s, panel.predicted, history.gaps)
@@ -144,13 +144,13 @@ def _over_session(axes: Axes, history: History, panel: Panel) -> None:
     if panel.estimated is not None:
         values, sigmas = panel.estimated
         stamps, drawn = broken(history.stamps_s, values, history.gaps)
-        _, bands = broken(history.stamps_s, BAND * sigmas, history.gaps)
+        _, bands = broken(history.stamps_s, band * sigmas, history.gaps)
         for i, colour in enumerate(COLOURS):
             label = f"estimated {'xy'[i]}{', ±2 sigma' if i else ''}"
             axes.plot(stamps, drawn[:, i], color=colour, linewidth=1.0, label=label)
             low, high = drawn[:, i] - bands[:, i], drawn[:, i] + bands[:, i]
             axes.fill_between(stamps, low, high, color=colour, alpha=0.22, linewidth=0)
-        usual = BAND * np.nanmedian(sigmas, axis=0)
+        usual = band * np.nanmedian(sigmas, axis=0)
         extents += [values - usual, values + usual]
         errors.append(("estimate", values))
     title = panel.title
@@ -209,16 +209,14 @@ def _enlarged(axes: Axes, history: History, truth: Truth | None, window: tuple[f
     legend_above(axes, 3, 0.99, handlelength=1.6)
 
 
-MOST_LINES = 24
-
-
 def posture_picture(path: Path, session: str, history: History, note: str) -> None:
     """Write the picture of the deflected boom at instants of a session."""
+    most_lines = 24
     with picture(path, f"{session}: deflected boom through the session", note) as figure:
         axes = figure.add_subplot()
         side_view(axes)
         colours = colours_of_times(figure, axes, history.stamps_s, TIME)
-        chosen = [history.shapes[k] for k in spread(len(history.shapes), MOST_LINES)]
+        chosen = [history.shapes[k] for k in spread(len(history.shapes), most_lines)]
         for stamp, line in chosen[1:-1]:
             axes.plot(*line.T, color=colours(stamp), linewidth=1.4)
         _, tip = broken(history.stamps_s, history.tip_position, history.gaps)

@@ -107,7 +107,6 @@ def deviation(model: Response, full: Response, course: StrokeCourse) -> Deviatio
 # In unknowns, measured on the default boom:
 AXIAL = 0.35  # an axial coordinate; other unknowns count as one
 OTHER = 0.6  # more for a flexible part that has not the usual shapes, for which the kernels have code of their own
-COORDINATE_COST = 0.05  # a coordinate of a mass, or a point that turns finitely
 
 STEPS = 400  # that are timed
 
@@ -119,11 +118,12 @@ def unknowns(scene: Scene) -> int:
 
 def size(scene: Scene) -> float:
     """Cost of a step, counted in unknowns: the same on every machine and at any load, so that choices can be made by it."""
+    coordinate_cost = 0.05  # a coordinate of a mass, or a point that turns finitely
     plan = compile_scene(scene)
     unknowns, beams = len(plan.names), plan.tables.beams
     other = np.sum((beams.bending != USUAL.bending) | (beams.axial != USUAL.axial))
     shares = len(plan.masses) - unknowns + beams.finite.sum()
-    return float(unknowns - (1.0 - AXIAL) * beams.axial.sum() + OTHER * other + COORDINATE_COST * shares)
+    return float(unknowns - (1.0 - AXIAL) * beams.axial.sum() + OTHER * other + coordinate_cost * shares)
 
 
 def step_times(scenes: Sequence[Scene], course: StrokeCourse, rounds: int) -> Array:

@@ -25,9 +25,6 @@ from ..scene.schema import Scene
 from ..types import Array
 
 CATEGORY = 71.0  # MPa, of a welded box where nothing better is known
-CUT_OFF_CYCLES = 1e8
-KNEE_CYCLES = 5e6
-CATEGORY_CYCLES = 2e6
 LIVES = (10, 20, 30)  # years of life for which the hours of work a year are given
 YEAR = 8760.0  # hours
 NOISE_RANGE = 1e5  # Pa; cycles below are noise, and do no damage in any category
@@ -52,10 +49,11 @@ def endured(ranges: Array, category: float) -> Array:
 
     N is infinite below the cut-off.
     """
-    knee = 1e6 * category * (CATEGORY_CYCLES / KNEE_CYCLES) ** (1.0 / 3.0)
-    limit = knee * (KNEE_CYCLES / CUT_OFF_CYCLES) ** 0.2
+    category_cycles, knee_cycles, cut_off_cycles = 2e6, 5e6, 1e8  # EN 1993-1-9, 7.1
+    knee = 1e6 * category * (category_cycles / knee_cycles) ** (1.0 / 3.0)
+    limit = knee * (knee_cycles / cut_off_cycles) ** 0.2
     with np.errstate(divide="ignore", over="ignore"):
-        steep, flat = CATEGORY_CYCLES * (1e6 * category / ranges) ** 3, KNEE_CYCLES * (knee / ranges) ** 5
+        steep, flat = category_cycles * (1e6 * category / ranges) ** 3, knee_cycles * (knee / ranges) ** 5
     return np.where(ranges >= knee, steep, np.where(ranges >= limit, flat, np.inf))
 
 

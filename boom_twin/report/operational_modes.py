@@ -23,12 +23,7 @@ from ..types import Array
 
 RATE = 40.0  # Hz, rate of the averaged samples
 SHORTEST_REST = 20.0  # s
-SETTLING = 1.0  # s, left out at the start of a rest period
 BLOCK_ROWS, HIGHEST_ORDER, RECORD_PARTS = 25, 40, 10
-LARGEST_DAMPING, LARGEST_VARIATION = 0.1, 0.05  # damping ratio; relative deviation of the frequency
-APART = 0.02  # relative difference that separates two modes
-FEWEST_ORDERS = 10  # model orders with a stable pole of a mode
-LINE_DAMPING = 0.002  # damping ratio below which it is a pump's line
 NEAR = 0.2  # largest relative distance of a measured mode from its mode of the model
 
 
@@ -91,9 +86,10 @@ def _measured(name: str, period: RestPeriod, scene: Scene, rigging: Rigging) -> 
 
 def _even(period: RestPeriod, channel: int) -> Array | None:
     """Return readings of a channel averaged to `RATE`, with mean 0 and deviation 1, or None if they are constant."""
-    own = (period.channels == channel) & (period.times >= SETTLING)
-    count = int((period.times[-1] - SETTLING) * RATE)
-    places = np.minimum(((period.times[own] - SETTLING) * RATE).astype(int), count - 1)
+    settling = 1.0  # s, left out at the start of a rest period
+    own = (period.channels == channel) & (period.times >= settling)
+    count = int((period.times[-1] - settling) * RATE)
+    places = np.minimum(((period.times[own] - settling) * RATE).astype(int), count - 1)
     sums, counts = (np.bincount(places, weights, count) for weights in (period.values[own], None))
     there = np.flatnonzero(counts)
     if len(there) < 2:
@@ -105,12 +101,13 @@ def _even(period: RestPeriod, channel: int) -> Array | None:
 
 def _identified(values: Array, leading: int, with_deviations: bool) -> tuple[Array, ...]:
     """Return frequencies (Hz), damping ratios, labels, deviations of the first two, shapes, by row and order of the poles."""
+    largest_damping, largest_variation = 0.1, 0.05  # damping ratio; relative deviation of the frequency
     try:
         from pyoma2.algorithms.ssi import SSI
         from pyoma2.setup.single import SingleSetup
     except ImportError:
         raise UsageError("pyOMA-2 is not installed. Install it: pip install 'boom_twin[modal]'.") from None
-    limits: Any = {"xi_max": LARGEST_DAMPING, "mpc_lim": None, "mpd_lim": None, "CoV_max": LARGEST_VARIATION}
+    limits: Any = {"xi_max": largest_damping, "mpc_lim": None, "mpd_lim": None, "CoV_max": largest_variation}
     method: Any = SSI(
         name="ssi", br=BLOCK_ROWS, ordmax=HIGHEST_ORDER, ref_ind=list(range(leading)), hc=limits,
         calc_unc=with_deviations, nb=RECORD_PARTS,
@@ -129,6 +126,8 @@ def _identified(values: Array, leading: int, with_deviations: bool) -> tuple[Arr
 
 def _stable_groups(values: Array) -> tuple[Array, list[Array]]:
     """Return all poles as in `MeasuredRest.poles`, and the stable ones of each mode: frequency, damping, deviations."""
+    fewest_orders = 10  # model orders with a stable pole of a mode
+    apart = 0.02  # relative difference that separates two modes
     frequencies, dampings, labels, frequency_sigmas, damping_sigmas, _ = _identified(values, values.shape[1], True)
     known = np.isfinite(frequencies)
     orders = np.broadcast_to(np.arange(frequencies.shape[1]), frequencies.shape)
@@ -136,8 +135,8 @@ def _stable_groups(values: Array) -> tuple[Array, list[Array]]:
     stable = known & (labels == 1)
     rows = np.column_stack([each[stable] for each in (frequencies, dampings, frequency_sigmas, damping_sigmas)])
     rows = rows[np.argsort(rows[:, 0])]
-    cuts = np.flatnonzero(np.diff(rows[:, 0]) > APART * rows[1:, 0]) + 1
-    return poles, [part for part in np.split(rows, cuts) if len(part) >= FEWEST_ORDERS]
+    cuts = np.flatnonzero(np.diff(rows[:, 0]) > apart * rows[1:, 0]) + 1
+    return poles, [part for part in np.split(rows, cuts) if len(part) >= fewest_orders]
 
 
 def _shapes(values: Array, leading: int, frequencies: list[float]) -> list[Array]:
@@ -151,9 +150,10 @@ def _shapes(values: Array, leading: int, frequencies: list[float]) -> list[Array
 
 
 def _mode(group: Array, shape: Array, model: Array) -> OperationalMode:
+    line_damping = 0.002  # damping ratio below which it is a pump's line
     frequency, damping, frequency_sigma, damping_sigma = np.median(group, axis=0).tolist()
     near = [float(each) for each in model if abs(each - frequency) <= NEAR * each]
     nearest = min(near, key=lambda each: abs(each - frequency), default=None)
     return OperationalMode(
-        frequency, frequency_sigma, damping, damping_sigma, len(group), damping < LINE_DAMPING, shape, nearest
+        frequency, frequency_sigma, damping, damping_sigma, len(group), damping < line_damping, shape, nearest
     )

@@ -16,15 +16,11 @@ from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import Array, Stream, stream_of
 
-RATE = 40.0  # Hz, to which samples are thinned out
 STILL_SPEED = 1e-3  # m/s of a stroke, above which a boom does not stand still
 SPEED_SPAN = 0.2  # s over which that speed is taken
 SHORTEST_REST = 3.0  # s; shorter rest periods are not evaluated
 EVALUATED = 60.0  # s of a rest period that are evaluated; free vibration has died away then, and memory goes by its square
-SHAKING_LOAD = 0.003  # share of the boom's weight: standard deviation of a load at the tip that shakes the boom
 MODE_DISTANCE = 0.2  # relative distance up to which a vibration belongs to the nearest mode of the model
-CYCLE_SIGMA = 0.02  # largest standard deviation of a frequency, in cycles of the rest period; in noise alone it is about 0.2
-COURSE_POINTS = 60  # times at which the model's frequencies are computed, at most
 
 
 class Series(NamedTuple):
@@ -51,13 +47,14 @@ def vibrations(times: Array, values: Array) -> list[Vibration]:
     Samples are averaged at even times first: means of a decaying vibration have the same frequency and damping. A filter would
     spoil the ends.
     """
+    rate = 40.0  # Hz, to which samples are thinned out
     columns = [column for column in values.T if 2 * np.isfinite(column).sum() > len(column)]
     if len(times) < 2 or not columns:
         return []
     interval = spacing(times)
     even = np.arange(times[0], times[-1], interval)
     rows = np.stack([np.interp(even, times[np.isfinite(c)], c[np.isfinite(c)]) for c in columns], axis=1)
-    step = max(1, round(1.0 / (RATE * interval)))
+    step = max(1, round(1.0 / (rate * interval)))
     if len(rows) < 3 * ORDER * step:
         return []
     whole = len(rows) // step * step
@@ -82,7 +79,8 @@ class RestFinder:
     """Search for the rest periods of a session that last `SHORTEST_REST`; of a long one, `EVALUATED` seconds are used."""
 
     def __init__(self, scene: Scene) -> None:
-        self._modes, self._least_load = ModeList(scene), SHAKING_LOAD * weight_of(scene)
+        shaking_load = 0.003  # share of the boom's weight: standard deviation of a load at the tip that shakes the boom
+        self._modes, self._least_load = ModeList(scene), shaking_load * weight_of(scene)
         self._found: list[RestPeriod] = []
         nothing = Series(np.zeros(0), np.zeros((0, 0)))
         self._strokes = self._motion = self._load = nothing  # from where a rest period may have begun
@@ -122,19 +120,21 @@ class RestFinder:
         return needed
 
     def _rest(self, start: float, stop: float) -> RestPeriod:
+        cycle_sigma = 0.02  # largest deviation of a frequency, in cycles of the rest period; in noise alone about 0.2
         strokes, motion, load = (each.between(start, stop) for each in (self._strokes, self._motion, self._load))
         model = self._modes.at(np.median(strokes.values, axis=0).tolist())
         if float(np.hypot(*load.values.std(axis=0))) > self._least_load:
             return RestPeriod(start, stop, model, {}, True)
         found = [each for each in vibrations(*motion) if is_free(each)]
-        certain = [each for each in found if each.frequency_sigma * (stop - start) < CYCLE_SIGMA]
+        certain = [each for each in found if each.frequency_sigma * (stop - start) < cycle_sigma]
         return RestPeriod(start, stop, model, _by_mode(certain, model), False)
 
 
 def course(history: History, scene: Scene) -> tuple[Array, Array]:
     """Return times (k,) in s and the model's natural frequencies (k, modes) at these times; NaN without an equilibrium."""
+    course_points = 60  # times at which the model's frequencies are computed, at most
     modes, count = ModeList(scene), len(history.stamps_s)
-    places = np.unique(np.linspace(0, count - 1, min(count, COURSE_POINTS)).astype(int))
+    places = np.unique(np.linspace(0, count - 1, min(count, course_points)).astype(int))
     rows = [modes.at(history.strokes[place].tolist()) for place in places]
     table = np.full((len(rows), max(map(len, rows))), np.nan)
     for row, found in zip(table, rows, strict=True):

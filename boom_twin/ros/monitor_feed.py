@@ -21,8 +21,6 @@ from .bag.subscriptions import resolved_topics
 from .runtime import message_class, qos_profile
 
 NAME = "boom_twin_monitor"
-DEPTH = 1000  # messages that may wait for the next look, for every topic: seconds of a session
-CAPACITY = 150_000  # rows kept of every table: twelve minutes at 200 Hz
 MOST = 400  # messages of one topic taken in one look, so that a flood of them leaves time for the pages
 RARE = (Output.HEALTH, Output.TIP_UNCERTAINTY, Output.DIAGNOSTICS)  # outputs of which none may be missed
 MOST_BYTES = 4_000_000  # bytes of one topic after which no more of its messages are taken in one look
@@ -36,14 +34,16 @@ class TopicFeed(Feed):
     """
 
     def __init__(self, topics: Topics, scene: Scene | None = None) -> None:
+        capacity = 150_000  # rows kept of every table: twelve minutes at 200 Hz
+        depth = 1000  # messages that may wait for the next look, for every topic: seconds of a session
         self._node = rclpy.create_node(NAME)
         topics = resolved_topics(topics, self._node)
-        super().__init__("live", Store(CAPACITY), topics, scene, boom=self._node.get_namespace())
+        super().__init__("live", Store(capacity), topics, scene, boom=self._node.get_namespace())
         shown = [topics.inputs[Stream.IMU], *topics.outputs.values(), topics.events]
         self._heard: list[tuple[Subscription[Any], str]] = []
         for topic in shown:
             if topic.absolute in self.topic_rows.names:
-                kind, qos = message_class(topic.type), qos_profile(topic.qos, DEPTH)
+                kind, qos = message_class(topic.type), qos_profile(topic.qos, depth)
                 if topic not in (*(topics.outputs[role] for role in RARE), topics.events):
                     qos.reliability = ReliabilityPolicy.BEST_EFFORT
                 heard = self._node.create_subscription(kind, topic.absolute, lambda _: None, qos, raw=True)

@@ -27,7 +27,6 @@ from .runtime import STOPPED, Log, one_line
 
 WAKE = 0.2  # time (s) between looks at whether it is over
 LATE = 0.5  # time (s) of work on messages, without a turn of the timers, after which the row of the events executor is too long
-PAUSE = 0.05  # most time (s) between two messages that counts as work on messages: one long callback makes no row
 TURN = 10.0
 """Time (s) of a turn of the events executor: each leaves 32 bytes behind in rclpy 7.1, half a megabyte in an hour of `WAKE`."""
 
@@ -61,8 +60,9 @@ class CallbackTurns:
 
     def is_flooded(self) -> bool:
         """Return True if messages keep timers and services from their turn; ask at every message."""
+        pause = 0.05  # most time (s) between two messages that counts as work on messages: one long callback makes no row
         now = time.monotonic()
-        self._worked, self._newest = self._worked + min(now - self._newest, PAUSE), now
+        self._worked, self._newest = self._worked + min(now - self._newest, pause), now
         return self._worked > LATE
 
     def run(self) -> None:
@@ -145,12 +145,10 @@ def with_information(take: Callable[[bytes, Mapping[str, Any]], None]) -> Callab
     return put
 
 
-FRESH = 0.005  # age (s) of a message from the executor above which more are assumed to wait in the executor's queue
 LARGEST = 1 << 18
 """Largest message that is read, bytes. A message of a thousand names (the most that are examined) is smaller."""
 CATCH_UP = 0.5  # time limit (s) for reading messages before a request whose answer depends on them
 BUDGET = 0.01  # time limit (s) for reading messages between two turns of the executor
-INTAKE = 0.2  # time limit (s) for taking messages from the executor before some are read
 
 
 class _Topic:
@@ -212,6 +210,7 @@ class ReceiveQueue:
 
     def open(self, name: str, depth: int, read: Callable[[bytes], None]) -> Callable[..., None]:
         """Return the callback of a raw subscription."""
+        fresh = 0.005  # age (s) of a message from the executor above which more are assumed to wait in the executor's queue
         self._topics[name] = topic = _Topic(depth, read)
 
         def put(data: bytes, info: Mapping[str, Any]) -> None:
@@ -230,7 +229,7 @@ class ReceiveQueue:
                 topic.dropped += 1
                 topic.gone += 1
             self.received += 1
-            self.is_behind = (now - arrival) * NANO > FRESH
+            self.is_behind = (now - arrival) * NANO > fresh
             if self._on_put is not None:
                 self._on_put()
 
@@ -266,6 +265,7 @@ class ReceiveQueue:
 
         The turn ends if a message cannot be read at once: more must be taken from the executor first.
         """
+        intake = 0.2  # time limit (s) for taking messages from the executor before some are read
         if self:
             turns.poll()
         else:
@@ -274,7 +274,7 @@ class ReceiveQueue:
                 turns.run()
             finally:
                 self._on_put = None
-        end, before = time.monotonic() + INTAKE, -1
+        end, before = time.monotonic() + intake, -1
         while self.is_behind and self.received != before and time.monotonic() < end:
             before = self.received
             turns.poll()

@@ -112,10 +112,6 @@ def node_name(endpoint: Any) -> str:
     return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
 
 
-MOST_LINES, LINES_SPAN = 4, 600.0
-"""Changes of a component to a warning and back that are logged within so many seconds: on a busy computer they come and go."""
-
-
 class DiagnosticsPublisher:
     """Publisher of the states of one node. `hardware_id` names what is diagnosed; empty: the node's name."""
 
@@ -146,10 +142,11 @@ class DiagnosticsPublisher:
 
         An error and its end are always logged. Other changes of a component are limited in rate.
         """
+        most_lines, lines_span = 4, 600.0  # logged changes of a component, in so many seconds
         if max(status.level, self._levels.get(status.name, Level.OK)) > Level.WARN:
             return True
-        now, times = time.monotonic(), self._logged.setdefault(status.name, deque(maxlen=MOST_LINES))
-        if len(times) == MOST_LINES and now - times[0] < LINES_SPAN:
+        now, times = time.monotonic(), self._logged.setdefault(status.name, deque(maxlen=most_lines))
+        if len(times) == most_lines and now - times[0] < lines_span:
             return False
         times.append(now)
         return True

@@ -141,11 +141,9 @@ def _angle_without_unit(document: Document) -> list[Fault]:
     return [document.fault(("base", "inclination"), value, "rad or degrees?", remedy)]
 
 
-SLIMMEST = 0.3  # width of a box over its height
-
-
 def odd_boxes(table: BoomTable, document: Document) -> list[Fault]:
     """Return a warning of every box that is wider than high, or much too slim."""
+    slimmest = 0.3  # width of a box over its height
     found = []
     for i, section in enumerate(table.sections):
         h, b, place = section.height, section.width, ("sections", i)
@@ -157,8 +155,8 @@ def odd_boxes(table: BoomTable, document: Document) -> list[Fault]:
             )
             remedy = f"Give height: {b:g} and width: {h:g}, if they are swapped."
             found.append(document.fault((*place, "height"), h, bound, remedy, "warning"))
-        elif b < SLIMMEST * h:
-            bound = f"expected at least {SLIMMEST * h:.3g} m for a box {h:g} m high"
+        elif b < slimmest * h:
+            bound = f"expected at least {slimmest * h:.3g} m for a box {h:g} m high"
             found.append(document.fault((*place, "width"), b, bound, "Give the outer width, and check its unit.", "warning"))
     return found
 

@@ -25,7 +25,6 @@ from .load import examine_text, parse, text_of
 from .oil_spring import middle_stiffness
 from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
 
-DIGITS = 1e-5  # relative; values are written with six digits
 Body = TypeVar("Body", RigidPart, CylinderPart)
 
 
@@ -178,12 +177,13 @@ def _changes(before: Any, after: Any, place: Place) -> Iterator[tuple[Place, Any
 
 
 def _same(one: Any, other: Any) -> bool:
+    digits = 1e-5  # relative; values are written with six digits
     if isinstance(one, dict):
         return isinstance(other, dict) and one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
     if isinstance(one, tuple | list):
         return isinstance(other, tuple | list) and len(one) == len(other) and all(map(_same, one, other))
     if isinstance(one, float) and isinstance(other, float):
-        return math.isclose(one, other, rel_tol=DIGITS)
+        return math.isclose(one, other, rel_tol=digits)
     return bool(one == other)
 
 

@@ -25,10 +25,8 @@ from .load import examine_text, with_end_mark
 from .oil_spring import middle_stiffness, stiffness
 from .schema import Cylinder, JointGeometry, Oil, Scene, Section
 
-ENDS = 1.2  # mass per metre of a rigid end against the beam's
 TUBE = 0.12  # wall of a barrel over its bore
 SPARE = 0.02  # of the travel, at each end of the stroke
-COMMENT_COLUMN = 46  # where comments begin
 RANGE = re.compile(r"joints\[\d+\]\.range_deg")
 
 
@@ -124,10 +122,11 @@ def _section(table: BoomTable, section: BoxSection, first: float | None) -> list
 
 
 def _end(per_metre: float, start: float, stop: float, height: float) -> tuple[dict[str, Any], str]:
+    ends = 1.2  # mass per metre of a rigid end against the beam's
     length = stop - start
-    mass = ENDS * per_metre * length
+    mass = ends * per_metre * length
     values = {"mass": mass, "com": [0.5 * (start + stop), 0.0], "inertia": mass * (length**2 + height**2) / 12}
-    return values, f"[estimate] m = {ENDS:g} rho_A a, a = {length:.3g}; m (a^2 + h^2) / 12"
+    return values, f"[estimate] m = {ends:g} rho_A a, a = {length:.3g}; m (a^2 + h^2) / 12"
 
 
 def _joint(table: BoomTable, joint: DrawnJoint, first: float | None) -> list[Row]:
@@ -202,11 +201,12 @@ def _postures(table: BoomTable) -> list[str]:
 
 
 def _item(rows: list[Row]) -> list[str]:
+    comment_column = 46  # where comments begin
     lines = []
     for number, (key, value, told) in enumerate(rows):
         text = value if isinstance(value, str) else yaml_text(value)  # words stand without quotes
         own = f"  {'-' if number == 0 else ' '} {key}: {text}".rstrip() if key.strip() else ""
-        lines.append(f"{own:{COMMENT_COLUMN}}  # {told}" if told else own)
+        lines.append(f"{own:{comment_column}}  # {told}" if told else own)
     return lines
 
 

@@ -20,7 +20,6 @@ from ..types import Array
 from .schema import Base, JointGeometry, Scene, Section
 
 RANGE_SAMPLES = 721  # angles of a joint's range at which it is examined
-START_SAMPLES = 181  # at which the angle of a stroke is looked for first
 MARGIN = math.radians(1.0)  # beyond range_deg: strokes at the ends, with their sensors' noise, still have an angle
 
 
@@ -130,15 +129,16 @@ def joint_angles_of_strokes(scene: Scene, strokes: Array, near: Array | None = N
     Where a stroke belongs to two angles, the one next to `near` (rad), shape (n,), if given. UsageError if a stroke is not
     reached anywhere in its joint's ``range_deg``, widened by one degree.
     """
+    start_samples = 181  # at which the angle of a stroke is looked for first
     rows = np.zeros(len(scene.joints), LINKAGE).view(np.recarray)
     for i in range(len(rows)):
         rows[i] = linkage(scene, i)
     ranges = np.radians([joint.range_deg for joint in scene.joints]) + np.array([-MARGIN, MARGIN])
     lengths = np.array([joint.cylinder.closed_length for joint in scene.joints]) + strokes
     angles, near = np.empty(len(rows)), np.full(len(rows), math.nan) if near is None else np.asarray(near, float)
-    angles_of_lengths(rows, lengths, near, ranges[:, 0].copy(), ranges[:, 1].copy(), START_SAMPLES, angles)
+    angles_of_lengths(rows, lengths, near, ranges[:, 0].copy(), ranges[:, 1].copy(), start_samples, angles)
     for i in np.flatnonzero(~np.isfinite(angles)).tolist():
-        curve = stroke_curve(scene, i, np.linspace(ranges[i, 0], ranges[i, 1], START_SAMPLES))
+        curve = stroke_curve(scene, i, np.linspace(ranges[i, 0], ranges[i, 1], start_samples))
         raise UsageError(
             f"{name}_{i + 1} = {float(strokes[i]):.6g} m: joint {i + 1} reaches {np.nanmin(curve):.6g} to "
             f"{np.nanmax(curve):.6g} m in its range_deg {scene.joints[i].range_deg}. Give a {name} inside."

@@ -32,7 +32,6 @@ else:
 
 IDEAL_BELOW = 1e-6  # m; a pin with less radial clearance is taken for ideal
 DEPTH_BY_GYRATION = 2.4  # depth of a drawn section over its radius of gyration: about that of a thin-walled box
-DEPTH_BY_LENGTH = 0.05  # of its length, where a section has no A and I
 MODES = "the number of bending coordinates per flexible part: a whole number from 0 to 10"
 AXIAL = "true or false, whether flexible parts stretch"
 GEOMETRIC = "true or false, whether flexible parts have geometric stiffness"
@@ -108,10 +107,11 @@ class Section(Part):
     @property
     def depth(self) -> float:
         """Depth (m) to draw the section with: its height, else that of a box with its A and I."""
+        depth_by_length = 0.05  # of its length, where a section has no A and I
         if self.height is not None:
             return self.height
         if self.A is None or self.I is None:
-            return DEPTH_BY_LENGTH * self.length
+            return depth_by_length * self.length
         return DEPTH_BY_GYRATION * math.sqrt(self.I / self.A)
 
     @property

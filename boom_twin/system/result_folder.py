@@ -29,7 +29,6 @@ BUILDING, REPLACED = ".unfinished", ".replaced"  # suffixes of the folders besid
 OF_THE_SYSTEM = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})  # a file manager leaves them in a folder
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Errors of a full disk, a full quota, or a file at its size limit. Errors of writing name no file."""
-_LARGEST_MANIFEST = 2**20  # bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,8 +196,9 @@ def _manifest(folder: Path) -> tuple[str, dict[str, str] | None]:
 
 def _note(path: Path) -> tuple[str, dict[str, str] | None]:
     """Return command and SHA-256 by file that a manifest states; a marker lists no files, an unreadable note no command."""
+    largest_manifest = 2**20  # bytes
     try:
-        content = json.loads(path.read_bytes()[:_LARGEST_MANIFEST])
+        content = json.loads(path.read_bytes()[:largest_manifest])
         listed = {str(name): str(digest) for name, digest in content["files"].items()} if "files" in content else None
         return str(content["command"]), listed
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):

@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import TextIO
 
-STDERR = 2  # number of the last of the three standard streams
-
 
 def printable(text: str, keep: str = "\n\t") -> str:
     r"""Return the text with every unprintable character escaped, as in ``\x1b``.
@@ -22,7 +20,7 @@ def printable(text: str, keep: str = "\n\t") -> str:
 
 def open_closed_streams() -> None:
     """Open closed standard streams on the null device. Otherwise a result file would get their number and the printed text."""
-    while (number := os.open(os.devnull, os.O_RDWR)) <= STDERR:
+    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:  # stderr, the last of the three
         os.set_inheritable(number, True)
     os.close(number)
 

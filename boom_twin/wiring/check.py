@@ -39,10 +39,8 @@ from .readings import Channel, Expected, RestModel, Table, Window, tables_of
 
 SURE = 7.0  # nats to the next hypothesis, least margin that determines a channel
 WRONG = 4.0  # nats per block (2.8 standard deviations) above which a channel is not as declared
-DOUBTFUL = 1.0  # nats per block above which other ways are compared, as an error may show in few postures
 KEPT = 8  # stroke explanations compared with all sensors
 MOVED = 0.03  # least change of a stroke that is a move, relative to the largest stroke
-STILL_WEIGHT, MOVED_WEIGHT = 1.0, 4.0  # effective number of independent postures: boom at rest; boom moved
 Declared = Mapping[Stream, Sequence[Channel]]
 
 
@@ -107,12 +105,13 @@ def check(model: RestModel, declared: Declared, window: Window, is_quick: bool =
     `declared` has every channel in their order. `window` has readings by name (IMU: by axis); strokes are required.
     `is_quick` only flags channels that are not read as declared.
     """
+    still_weight, moved_weight = 1.0, 4.0  # effective number of independent postures: boom at rest; boom moved
     tables = {stream: table for stream, table in tables_of(window).items() if len(table.names)}
     strokes = tables.get(Stream.STROKES)
     if strokes is None or not len(strokes.values) or len(strokes.names) < len(model.scene.joints):
         return None
     moved = bool((np.ptp(strokes.values, axis=0) > MOVED * np.abs(strokes.values).max()).any())
-    checker = _Checker(model, declared, tables, MOVED_WEIGHT if moved else STILL_WEIGHT, is_quick)
+    checker = _Checker(model, declared, tables, moved_weight if moved else still_weight, is_quick)
     return Checked(checker.verdicts(), moved, tables) if checker.found else None
 
 
@@ -199,11 +198,12 @@ class _Checker:
         return _Explanation(strokes, parts, prior + sum(part.cost for part in parts.values()))
 
     def _part(self, stream: Stream, expected: Expected, cube_of: Callable[[], Cube]) -> _Part:
+        doubtful = 1.0  # nats per block above which other ways are compared, as an error may show in few postures
         declared, names = self._declared[stream], self._tables[stream].names
         costs = declared_costs(stream, self._tables[stream], declared, expected, self._weight)
         is_known = {each.name for each in declared}.issuperset(names)
         wrong = [not is_known if cost is None else cost > WRONG * self._weight for cost in costs]
-        if self._is_quick or not any(cost is None or cost > DOUBTFUL * self._weight for cost in costs):
+        if self._is_quick or not any(cost is None or cost > doubtful * self._weight for cost in costs):
             total = sum(cost or 0.0 for cost in costs)
             return _Part(total, tuple(declared), tuple(wrong), tuple(not each for each in wrong), lambda j: np.inf)
         cube = cube_of()

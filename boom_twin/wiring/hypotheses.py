@@ -19,9 +19,6 @@ from ..types import GIVE, SENSORS, Array, Stream
 from .readings import Channel, Expected, Table
 
 ANGLE_ERROR = math.radians(0.7)  # rad, zero error of an encoder and error of the scene
-GRAVITY_ERROR = 0.6  # m/s^2, bias of an IMU and mean acceleration of the tip
-REST_ERROR = 0.3  # m/s^2, the same if the driver removes gravity
-FORCE_SHARE, FORCE_LEAST = 0.12, 0.04  # force error by loads, relative to the force and to the largest
 MOST = 12.0  # nats, largest cost of a block, as a reading may err for a reason without hypothesis
 NEAR_ZERO = math.radians(5.0)  # tolerance of zeros (left to calibration) and of quarter and half turns
 UNIT, OTHER_UNIT, SIGN, NAME, EXTRA_NAME = 4.0, 9.0, 4.0, 3.0, 6.0  # nats, prior costs of changes
@@ -30,8 +27,6 @@ ABSOLUTE, TURNED, NO_GRAVITY = 4.0, 8.0, 4.0
 IMPOSSIBLE = 1e6  # nats
 OUTSIDE = 60.0  # nats for strokes beyond the travel
 SLACK = 0.02  # allowed stroke beyond the travel, relative to it
-LEAST_SLOPE = 0.02  # m/rad, of a cylinder at a dead centre
-LOOSE = 3.0  # factor on the angle error if encoders select stroke explanations
 TAU = 2.0 * math.pi
 
 
@@ -154,8 +149,9 @@ def declared_costs(
 
 
 def _force_error(expected: Expected, j: int) -> Array:
+    force_share, force_least = 0.12, 0.04  # force error by loads, relative to the force and to the largest
     return np.asarray(
-        FORCE_SHARE * np.abs(expected.forces[:, j]) + FORCE_LEAST * np.nanmax(np.abs(expected.forces), initial=1.0)
+        force_share * np.abs(expected.forces[:, j]) + force_least * np.nanmax(np.abs(expected.forces), initial=1.0)
     )
 
 
@@ -224,6 +220,8 @@ class GravityHypothesis(NamedTuple):
 
 def gravity_hypotheses(table: Table, declared: Sequence[Channel], gravity: Array, weight: float) -> list[GravityHypothesis]:
     """Return all ways to read an IMU if `gravity` (blocks,) is expected, the declared one first."""
+    gravity_error = 0.6  # m/s^2, bias of an IMU and mean acceleration of the tip
+    rest_error = 0.3  # m/s^2, the same if the driver removes gravity
     units = SENSORS[Stream.IMU].units
     places = {name: a for a, name in enumerate(table.names)}
     is_read = np.isfinite(table.values[:, [places[each.name] for each in declared]]).all(axis=1)
@@ -238,7 +236,7 @@ def gravity_hypotheses(table: Table, declared: Sequence[Channel], gravity: Array
                     two = declared[1]._replace(name=z, unit=unit, sign=flip_z * declared[1].sign)
                     f = si(one, units, table.values[is_read, places[x]]) + 1j * si(two, units, table.values[is_read, places[z]])
                     spread = np.hypot(table.spreads[is_read, places[x]], table.spreads[is_read, places[z]]) * units[unit]
-                    sigma = np.hypot(GRAVITY_ERROR, spread)
+                    sigma = np.hypot(gravity_error, spread)
                     f = f * np.exp(1j * one.turned)
                     cost = (UNIT if unit != declared[0].unit else 0.0) + (SIGN if min(flip_x, flip_z) < 0 else 0.0)
                     cost += NAME if (x, z) != (declared[0].name, declared[1].name) else 0.0
@@ -251,7 +249,7 @@ def gravity_hypotheses(table: Table, declared: Sequence[Channel], gravity: Array
                         pair = one._replace(turned=one.turned + turn), two._replace(turned=two.turned + turn)
                         found.append(GravityHypothesis(cost + TURNED + float(misfit(off, weight)), pair))
     rest = np.hypot.reduce([table.values[is_read, a] for a in range(len(table.names))], axis=0)
-    found.append(GravityHypothesis(NO_GRAVITY + float(misfit(rest / REST_ERROR, weight)), (declared[0], declared[1]), True))
+    found.append(GravityHypothesis(NO_GRAVITY + float(misfit(rest / rest_error, weight)), (declared[0], declared[1]), True))
     first = next(i for i, each in enumerate(found) if each.channels == tuple(declared))
     return [found[first], *found[:first], *found[first + 1 :]]
 
@@ -306,6 +304,8 @@ class _Curves(NamedTuple):
 
 
 def _curves(scene: Scene, j: int, encoders: Encoders) -> _Curves:
+    loose = 3.0  # factor on the angle error if encoders select stroke explanations
+    least_slope = 0.02  # m/rad, of a cylinder at a dead centre
     tracks, costs = list[Array](), list[float]()
     units, (table, declared, is_in_order) = SENSORS[Stream.ANGLES].units, encoders
     low, high = np.radians(scene.joints[j].range_deg)
@@ -323,5 +323,5 @@ def _curves(scene: Scene, j: int, encoders: Encoders) -> _Curves:
                 costs.append(name_cost(declared, j, name, table.names) + cost)
     angles, step = np.array(tracks).reshape(len(costs), len(table.values)), 1e-3
     before, after = (stroke_curve(scene, j, (angles + each).ravel()).reshape(angles.shape) for each in (-step, step))
-    sigmas = np.maximum(np.abs(after - before) / (2.0 * step), LEAST_SLOPE) * LOOSE * ANGLE_ERROR
+    sigmas = np.maximum(np.abs(after - before) / (2.0 * step), least_slope) * loose * ANGLE_ERROR
     return _Curves(0.5 * (before + after), sigmas, np.array(costs))

@@ -23,9 +23,6 @@ from ..scene.schema import Scene
 from ..types import NANO, NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading
 
 BLOCK = 100_000_000  # ns, averaging time of readings
-MEAN = 10  # blocks on each side in the mean of forces and accelerations, which removes vibration
-CORRELATED = 5.0  # blocks with correlated vibration
-EVENLY = 12  # compared blocks evenly in time, besides the extremes of every stroke
 
 
 class Channel(NamedTuple):
@@ -69,6 +66,7 @@ def tables_of(window: Window) -> dict[Stream, Table]:
 
     Names without readings there are left out.
     """
+    mean = 10  # blocks on each side in the mean of forces and accelerations, which removes vibration
     strokes = [_means(series) for series in window[Stream.STROKES].values()]
     common = strokes[0][0] if strokes else np.zeros(0, np.int64)
     for numbers, _ in strokes[1:]:
@@ -76,7 +74,7 @@ def tables_of(window: Window) -> dict[Stream, Table]:
     chosen = _chosen(common, [means[np.searchsorted(numbers, common)] for numbers, means in strokes])
     found = {}
     for stream, by_name in window.items():
-        reach = MEAN if stream is Stream.FORCES or SENSORS[stream].is_accelerometer else 0
+        reach = mean if stream is Stream.FORCES or SENSORS[stream].is_accelerometer else 0
         columns = [_at(chosen, *_means(series), reach) for series in by_name.values()]
         values, spreads = np.moveaxis(np.array(columns).reshape(len(columns), 2, len(chosen)), 0, 2)
         there = np.flatnonzero(np.isfinite(values).any(axis=0))
@@ -92,30 +90,28 @@ def _means(series: Series) -> tuple[NDArray[np.int64], Array]:
 
 
 def _chosen(common: NDArray[np.int64], strokes: list[Array]) -> NDArray[np.int64]:
+    evenly = 12  # compared blocks evenly in time, besides the extremes of every stroke
     if not len(common):
         return common
-    rows = set(np.linspace(0, len(common) - 1, EVENLY).round().astype(int).tolist())
+    rows = set(np.linspace(0, len(common) - 1, evenly).round().astype(int).tolist())
     rows |= {int(pick(values)) for values in strokes for pick in (np.argmin, np.argmax)}
     return common[sorted(rows)]
 
 
 def _at(chosen: NDArray[np.int64], numbers: NDArray[np.int64], means: Array, reach: int) -> Array:
     """Return mean and standard error (2, blocks) over `reach` blocks before and after each chosen block."""
+    correlated = 5.0  # blocks with correlated vibration
     first, end = np.searchsorted(numbers, chosen - reach), np.searchsorted(numbers, chosen + reach, "right")
     middle = means.mean() if len(means) else 0.0
     sums = [np.concatenate([[0.0], np.cumsum(each)]) for each in (means - middle, (means - middle) ** 2)]
     with np.errstate(invalid="ignore", divide="ignore"):
         mean, square = ((each[end] - each[first]) / (end - first) for each in sums)
-    share = np.minimum(CORRELATED / np.maximum(end - first, 1), 1.0)
+    share = np.minimum(correlated / np.maximum(end - first, 1), 1.0)
     return np.array([mean + middle, np.sqrt(np.maximum(square - mean**2, 0.0) * share)])
 
 
 SPAN = 4.0  # s, span whose mean is removed, so that zeros and slow model errors are no lag
 LONGEST, COARSE = 1.0, 0.05  # s, largest lag of the search, and spacing of the first guesses
-ROUNDS = 6  # Gauss-Newton steps
-FEWEST = 3.0  # least effective number of moving spans and channels
-CLEAR = 0.5  # largest squared residual with the lag, relative to that without
-FLOOR = 1e-3  # s, standard deviation of a lag by model errors
 
 
 class Lag(NamedTuple):
@@ -130,6 +126,10 @@ def lag_of(stamps: NDArray[np.int64], read: Array, expected: Array) -> Lag:
 
     Gauss-Newton starts from the best of several guesses. The scatter among spans gives the deviation.
     """
+    floor = 1e-3  # s, standard deviation of a lag by model errors
+    clear = 0.5  # largest squared residual with the lag, relative to that without
+    fewest = 3.0  # least effective number of moving spans and channels
+    rounds = 6  # Gauss-Newton steps
     times = (stamps - stamps[0]) * NANO
     spans = (times // SPAN).astype(int)
     off = [_left(times, spans, read, expected, lag)[0] for lag in np.arange(-LONGEST, LONGEST + COARSE, COARSE)]
@@ -137,18 +137,18 @@ def lag_of(stamps: NDArray[np.int64], read: Array, expected: Array) -> Lag:
     scale = np.fmax(np.nanmin(sizes, axis=0), 1e-300) / max(len(times), 1)
     lag = float(np.arange(-LONGEST, LONGEST + COARSE, COARSE)[int((sizes / scale).sum(axis=1).argmin())])
     before = float((np.nansum(_left(times, spans, read, expected, 0.0)[0] ** 2, axis=0) / scale).sum())
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         left, slopes = _left(times, spans, read, expected, lag)
         by, weight = (_summed(spans, np.nan_to_num(each / scale)) for each in (-left * slopes, slopes**2))
-        if not weight.sum() > 0.0 or weight.sum() ** 2 < FEWEST * (weight**2).sum():
+        if not weight.sum() > 0.0 or weight.sum() ** 2 < fewest * (weight**2).sum():
             return Lag(0.0, math.inf)
         change = float(by.sum() / weight.sum())
         lag += min(max(change, -COARSE), COARSE)
     after = float((np.nansum(left**2, axis=0) / scale).sum())
-    if abs(lag) > LONGEST or (abs(lag) > COARSE and after > CLEAR * before):
+    if abs(lag) > LONGEST or (abs(lag) > COARSE and after > clear * before):
         return Lag(0.0, math.inf)
     scatter = math.sqrt(float(((by - change * weight) ** 2).sum())) / float(weight.sum())
-    return Lag(lag, math.hypot(scatter, FLOOR))
+    return Lag(lag, math.hypot(scatter, floor))
 
 
 def _left(times: Array, spans: NDArray[np.int64], read: Array, expected: Array, lag: float) -> tuple[Array, Array]:

@@ -87,8 +87,6 @@ def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
 
 SPECTRUM_SPAN = 40.0  # time span of the spectrum, up to the shown time, s
 SEGMENT = 8.0  # segment of Welch's method, s (Hann window, half overlapping, mean removed)
-LOWEST_PEAK, HIGHEST_PEAK = 0.3, 30.0  # frequencies of peaks, Hz
-MAX_PEAKS = 5
 PROMINENCE = 6.0  # lowest prominence of a peak, dB
 
 
@@ -126,11 +124,13 @@ def spectrum(times: Array, values: Array) -> Spectrum | None:
 
 def _peaks(frequencies: Array, density: Array, rate: float) -> list[Peak]:
     """Return the highest prominent peaks. Their frequency is from a parabola through the decibels."""
+    max_peaks = 5
+    lowest_peak, highest_peak = 0.3, 30.0  # frequencies of peaks, Hz
     level = 10.0 * np.log10(np.maximum(density, 1e-30))
     found, _ = find_peaks(level, prominence=PROMINENCE)
-    found = [i for i in found if LOWEST_PEAK <= frequencies[i] <= min(HIGHEST_PEAK, 0.4 * rate)]
+    found = [i for i in found if lowest_peak <= frequencies[i] <= min(highest_peak, 0.4 * rate)]
     peaks = []
-    for i in sorted(found, key=lambda place: -level[place])[:MAX_PEAKS]:
+    for i in sorted(found, key=lambda place: -level[place])[:max_peaks]:
         below, top, above = level[i - 1 : i + 2]
         bend = below - 2.0 * top + above
         offset = 0.5 * (below - above) / bend if bend else 0.0
@@ -141,8 +141,6 @@ def _peaks(frequencies: Array, density: Array, rate: float) -> list[Peak]:
 
 UNKNOWN_SCENE = RatesToAvoid(trouble="the model is not known: give --scene")
 UNKNOWN_POSTURE = RatesToAvoid(trouble="the posture is not known yet")
-KNOWN_SHARE = 0.9  # share of the rows of a signal that must have a value
-MODE_DISTANCE = 0.2  # relative distance up to which a peak is taken for a mode of the model
 
 
 class Analyst:
@@ -196,11 +194,12 @@ class Analyst:
 
     def _signal(self, time: float) -> Signal:
         """Return the best acceleration that has values in the last segment before `time` (s)."""
+        known_share = 0.9  # share of the rows of a signal that must have a value
         for signal in SIGNALS:
             table = self._feed.store.tables.get(signal.table)
             if table is not None:
                 _, values = table.rows(table.until(time - SEGMENT), table.until(time))
-                if len(values) and np.isfinite(values[:, signal.columns]).all(axis=1).mean() > KNOWN_SHARE:
+                if len(values) and np.isfinite(values[:, signal.columns]).all(axis=1).mean() > known_share:
                     return signal
         return PREDICTION
 
@@ -211,9 +210,10 @@ class Analyst:
     @staticmethod
     def _placed(peak: Peak, natural: list[float]) -> dict[str, Any]:
         """Return a peak with the number of its mode and its deviation from the model; None without a mode near it."""
+        mode_distance = 0.2  # relative distance up to which a peak is taken for a mode of the model
         told: dict[str, Any] = {**asdict(peak), "mode": None, "deviation": None}
         mode = int(np.argmin(np.abs(np.array(natural) - peak.frequency))) + 1 if natural else 0
-        if not mode or abs(natural[mode - 1] - peak.frequency) > MODE_DISTANCE * natural[mode - 1]:
+        if not mode or abs(natural[mode - 1] - peak.frequency) > mode_distance * natural[mode - 1]:
             return told
         return told | {"mode": mode, "deviation": peak.frequency / natural[mode - 1] - 1.0}
 

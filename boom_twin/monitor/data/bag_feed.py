@@ -29,7 +29,6 @@ from ...types import NANO, Report, Sample
 from .feed import Feed
 from .store import Store
 
-DIAGNOSIS_PERIOD = 1.0  # seconds between two diagnoses of the twin, as of the node
 PUBLISHED_OUTPUT = Output.TIP_ACCELERATION  # A session with this output is shown as its node published it
 COMPILING = "compiling the model (up to a minute the first time)"
 READING_TIME = 0.04  # seconds of reading at a time, after which the pages have their turn
@@ -158,6 +157,7 @@ class TwinView:
 
     def took(self, sample: Sample, report: Report) -> None:
         """Show the results of one sample."""
+        diagnosis_period = 1.0  # seconds between two diagnoses of the twin, as of the node
         self._time = max(self._time, sample.stamp * NANO)
         if self._looked is None:
             self._watch.begin()
@@ -169,7 +169,7 @@ class TwinView:
         for key, encoded in chain.from_iterable(map(self._encoder.fill, report.all)):
             if key in self._names:
                 self._feed.topic_rows.take_encoded(self._names[key], encoded, self._feed.now())
-        if self._time - self._looked >= DIAGNOSIS_PERIOD or self._watch.is_urgent():
+        if self._time - self._looked >= diagnosis_period or self._watch.is_urgent():
             self._look()
 
     def finish(self) -> None:

@@ -82,9 +82,6 @@ class Feed:
         return drives_as_read(self._plan, strokes, forces, self._reads)
 
 
-SLOWEST_PLAYBACK, FASTEST_PLAYBACK = 0.1, 10.0
-
-
 class Playback:
     """Position (s) in a recorded session. Unless held, it advances at a speed up to what has been read of the session."""
 
@@ -107,7 +104,8 @@ class Playback:
 
     def pace(self, speed: float) -> None:
         """Set the speed, limited to the permitted range."""
-        self.speed = min(max(speed, SLOWEST_PLAYBACK), FASTEST_PLAYBACK)
+        slowest_playback, fastest_playback = 0.1, 10.0
+        self.speed = min(max(speed, slowest_playback), fastest_playback)
 
     def hold(self, is_held: float) -> None:
         """Hold, or go on; from the end of the session that is from its beginning."""

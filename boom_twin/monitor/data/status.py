@@ -141,7 +141,8 @@ def _judged(values: Mapping[str, float], level: Severity) -> tuple[str, float]:
 
 def text(found: str) -> str:
     """Return a text as it may be shown: the beginning of a long one, control characters as escapes."""
-    return printable(found[:LONGEST_TEXT], keep="")
+    longest_text = 500  # characters of a text that are kept
+    return printable(found[:longest_text], keep="")
 
 
 def _number(value: str) -> float:
@@ -151,8 +152,6 @@ def _number(value: str) -> float:
         return nan
 
 
-LONGEST_TEXT = 500  # characters of a text that are kept
-LONGEST_NAME = 100  # characters beyond which an alarm names no more sensors
 MAX_ALARMS = 500  # alarms that are kept
 
 
@@ -190,6 +189,7 @@ class AlarmList:
 
     def follow(self, time: float, statuses: StatusTable) -> None:
         """Update the alarms to the lamps at `time` (s), except the lamp of the rig's health, see `judge`."""
+        longest_name = 100  # characters beyond which an alarm names no more sensors
         told = ((f"{node}: {lamp.name}", lamp) for node, (_, lamps) in statuses.nodes.items() for lamp in lamps)
         judged = {channel for channel, _ in self._judged}
         lamps = {key: lamp for key, lamp in told if lamp.name != HEALTH and lamp.channel not in judged}
@@ -201,7 +201,7 @@ class AlarmList:
             alarm = self._open.get(key)
             if alarm is None and lamp.level > Severity.OK:
                 same = (lamp.reason, lamp.level)
-                if same in begun and len(begun[same].name) < LONGEST_NAME:
+                if same in begun and len(begun[same].name) < longest_name:
                     begun[same].name += f", {lamp.channel or lamp.name}"
                 self._open[key] = begun.setdefault(same, begun.get(same) or self.add(lamp.name, lamp.level, lamp.reason, time))
             elif alarm is not None and lamp.level > alarm.level:

@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from ...messages.sample_decoder import LATEST, MOST_NAMES, stamp_of
 from ...system.terminal_text import printable
-from ...types import NANO, SENSORS, Stream, stream_of
+from ...types import NANO, SECOND, SENSORS, Stream, stream_of
 from .status import AlarmList, StatusTable
 
-FIRST_ROOM = 1024  # initial capacity of a table, rows
 Rows = tuple[NDArray[np.float64], NDArray[np.float32]]
 
 
@@ -30,9 +29,10 @@ class Table:
     """Ring buffer of rows: named columns (``x_m``) and a time. It grows up to `capacity`, then the oldest rows are dropped."""
 
     def __init__(self, name: str, columns: Sequence[str], capacity: int) -> None:
+        first_room = 1024  # initial capacity of a table, rows
         self.name, self.columns, self._capacity = name, tuple(columns), capacity
         self.count = 0  # rows ever added; row numbers begin at 0
-        self._times = np.zeros(min(capacity, FIRST_ROOM))
+        self._times = np.zeros(min(capacity, first_room))
         self._values = np.zeros((len(self._times), len(columns)), dtype=np.float32)
 
     @property
@@ -66,10 +66,6 @@ class Table:
         return self._times[places], self._values[places]
 
 
-MAX_STATUSES = 100_000  # largest number of kept states of the lamps, about a day
-SET_BACK = 1_000_000_000
-"""Threshold (ns) of a backward jump: beyond it the clock may have been set back, else the stamp is out of order."""
-LEAP_AHEAD = 60_000_000_000  # threshold (ns) of a forward jump that may be an outlier; rows of a table are closer together
 EVERY_STROKE, GAP = "displacement", 0.1
 """Table with a row for every stroke sample; pause (s) between its rows that raises an alarm."""
 
@@ -109,14 +105,16 @@ class Store:
         A row with a jump in its stamp is held until the next row of its table. If that follows closely, both are added.
         Otherwise the held row was an outlier, which is an error. A clock set back deletes all earlier rows.
         """
+        leap_ahead = 60 * SECOND  # largest forward step (ns) that is no leap; rows of a table are closer together
+        set_back = SECOND  # largest backward step (ns) of a stamp that is out of order; beyond it the clock may be set back
         if name in self.tables and self.tables[name].columns != tuple(columns):
             raise MalformedError(_difference(self.tables[name].columns, columns))
         last, held = self._last.get(name, stamp - 1), self._held.get(name)
-        is_leap = not -SET_BACK <= stamp - last <= LEAP_AHEAD
+        is_leap = not -set_back <= stamp - last <= leap_ahead
         if not is_leap and stamp <= last:
             raise MalformedError(f"its stamp is not after the last one but {(last - stamp) * NANO:.9g} s before it")
         self._held.pop(name, None)
-        if is_leap and held is not None and 0 < stamp - held[0] <= LEAP_AHEAD:
+        if is_leap and held is not None and 0 < stamp - held[0] <= leap_ahead:
             if stamp < last:
                 self.clear()
             self.append(name, columns, *held)
@@ -141,11 +139,12 @@ class Store:
 
     def set_statuses(self, time: float, statuses: StatusTable) -> None:
         """Set the lamps from `time` (s, lamps' clock) on and update the alarms."""
+        max_statuses = 100_000  # largest number of kept states of the lamps, about a day
         if not self._keeps_statuses:
             self._statuses.clear()
         self._statuses.append((time, statuses))
-        if len(self._statuses) > MAX_STATUSES:
-            del self._statuses[: MAX_STATUSES // 2]
+        if len(self._statuses) > max_statuses:
+            del self._statuses[: max_statuses // 2]
         self.alarms.follow(self.newest, statuses)
 
     def statuses(self, time: float) -> StatusTable:

@@ -30,10 +30,8 @@ from .store import (
     check_stamp,
 )
 
-MAX_BYTES = 1_000_000  # bytes of an encoded message; a longer one is not decoded
 MAX_STATUSES, MAX_CAUSES, MAX_MARKERS = 500, 100, 500
 """Statuses or alarms of one message, causes of one alarm, markers of one shape."""
-MAX_COLUMNS = 1000  # numbers of one row; a boom of nine sections has some two hundred
 MAX_WAITING = 1000  # stamps of which parts may wait for the others
 COMPARED = Stream.IMU  # the stream whose readings are shown beside the predicted ones; of all others the residuals are
 RESIDUALS = {stream: "joints" if stream is Stream.ANGLES else stream.value for stream in Stream if stream is not COMPARED}
@@ -139,9 +137,10 @@ class TopicRows:
 
     def take_encoded(self, topic: str, data: bytes, now: float) -> None:
         """Take a CDR-encoded message of a topic, as `take` does."""
+        max_bytes = 1_000_000  # bytes of an encoded message; a longer one is not decoded
         self._now = now
         with self.dropped.guard(topic):
-            check_count("bytes", len(data), MAX_BYTES)
+            check_count("bytes", len(data), max_bytes)
             self._takers[topic](decode(data, self._types[topic]))
 
     def measure(self, sample: Sample) -> None:
@@ -210,6 +209,7 @@ class TopicRows:
             self._append("force", FORCE_COLUMNS, stamp, [x, z, x - left_x, z - left_z, *sigmas])
 
     def _take_shape(self, msg: Any) -> None:
+        max_columns = 1000  # numbers of one row; a boom of nine sections has some two hundred
         check_count("markers", len(msg.markers), MAX_MARKERS)
         lines = {(marker.ns, marker.id): marker.points for marker in msg.markers}
         boom, straight = lines.get(("boom", 0)), lines.get(("boom_undeflected", 0))
@@ -224,7 +224,7 @@ class TopicRows:
         columns = [f"{name}_{i}_{axis}_m" for name, count in names for i in range(count) for axis in "xz"]
         columns += [f"force_{i + 1}_N" for i in range(len(self._forces))]
         columns += [f"stroke_{i + 1}_m" for i in range(len(self._strokes))]
-        check_count("numbers of a shape", len(columns), MAX_COLUMNS)
+        check_count("numbers of a shape", len(columns), max_columns)
         values = check_numbers([number for point in (*boom, *straight, *pins) for number in (point.x, point.z)])
         self._append("shape", columns, check_stamp(msg.markers[0]), values + self._forces + self._strokes)
 

@@ -82,9 +82,6 @@ def _short(name: str) -> str:
     return name.replace("/msg/", "/")
 
 
-DEPTH = 4000  # queue of every topic, messages: some seconds of a session
-
-
 @dataclass(frozen=True, slots=True)
 class RequestedTopic:
     """Topic to record."""
@@ -160,9 +157,10 @@ def subscription_of(node: Any, wanted: RequestedTopic) -> tuple[Any, QoSProfile,
 
     Raise UsageError if the type is not installed, or publishers differ in type.
     """
+    depth = 4000  # queue of every topic, messages: some seconds of a session
     if wanted.topic is not None:
         topic = wanted.topic
-        return installed_class(topic.type), qos_profile(topic.qos, DEPTH), recorded(topic)
+        return installed_class(topic.type), qos_profile(topic.qos, depth), recorded(topic)
     publishers = node.get_publishers_info_by_topic(wanted.name)
     types = {wanted.type} if wanted.type else {each.topic_type for each in publishers}
     if len(types) > 1:
@@ -174,7 +172,7 @@ def subscription_of(node: Any, wanted: RequestedTopic) -> tuple[Any, QoSProfile,
     is_known = type_name in jazzy().types
     type_hash = jazzy().hash_rihs01(type_name) if is_known else str(publishers[0].topic_type_hash)
     described = Recorded.offered(wanted.name, type_name, definition_of(kind), qos, type_hash)
-    return kind, qos_profile(qos, DEPTH), described
+    return kind, qos_profile(qos, depth), described
 
 
 def _qos(offered: list[QoSProfile]) -> Qos:

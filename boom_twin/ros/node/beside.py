@@ -16,8 +16,6 @@ from ..startup import PREPARATION
 
 Result = TypeVar("Result")
 
-LOOK_FOR_RESULT = 0.05  # seconds of steady time between looks at whether the work is done
-
 
 class BackgroundTask(Generic[Result]):
     """Work too long for a callback, done in a thread. A callback of `node` receives its result.
@@ -33,9 +31,10 @@ class BackgroundTask(Generic[Result]):
         use: Callable[[Result], None],
         give_up: Callable[[Exception], None],
     ) -> None:
+        look_for_result = 0.05  # seconds of steady time between looks at whether the work is done
         self._node, self._work, self._use, self._give_up = node, work, use, give_up
         self._ended: Callable[[], None] | None = None
-        self._timer = node.create_timer(LOOK_FOR_RESULT, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(look_for_result, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
         Thread(target=self._run, name=PREPARATION, daemon=True).start()
 
     def abandon(self) -> None:
@@ -57,7 +56,6 @@ class BackgroundTask(Generic[Result]):
             self._ended()
 
 
-LOOK_FOR_END = 1.0  # seconds of steady time between looks at whether it still runs
 END_TIMEOUT = 1.0  # seconds that it may take to end
 
 
@@ -70,6 +68,7 @@ class MonitorProcess:
     """
 
     def __init__(self, node: Node, topics: Topics, mapping: str, scene: str) -> None:
+        look_for_end = 1.0  # seconds of steady time between looks at whether it still runs
         self._node = node
         namespace = node.get_namespace()
         there = topics.in_namespace(namespace)
@@ -84,7 +83,7 @@ class MonitorProcess:
             arguments += ["-r", f"{name}:={resolved}"] if resolved != name else []
         command = python_command("boom_twin.cli.main", "monitor", *arguments)
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE)
-        self._timer = node.create_timer(LOOK_FOR_END, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(look_for_end, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def close(self) -> None:
         """End the process."""

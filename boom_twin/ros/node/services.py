@@ -18,7 +18,6 @@ from ...twin.twin import Twin
 from ...types import SENSORS, Change, Report, Stream, StrokeReading, streams_of
 from ..runtime import Log
 
-PAUSE = 1.0  # time (s) between two calls of a service that starts the model from rest, which takes as long as hundreds of steps
 FROM_REST = re.compile(r"reset|rezero/cylinder_\d+")
 INACTIVE = "the node is not active, so nothing is measured. Activate it first."
 
@@ -84,10 +83,11 @@ class Services:
 
     def _limit(self, name: str) -> None:
         """Raise UsageError if a service that restarts the model from static equilibrium is called again too soon."""
+        pause = 1.0  # s between two calls: a start from rest takes as long as hundreds of steps
         now = time.monotonic()
         if FROM_REST.fullmatch(name):
-            if now - self._called.get(name, -PAUSE) < PAUSE:
-                told = f"{name} was called less than {PAUSE:g} s ago, and the model starts from rest with it"
+            if now - self._called.get(name, -pause) < pause:
+                told = f"{name} was called less than {pause:g} s ago, and the model starts from rest with it"
                 raise UsageError(f"{told}. Call it again later.")
             self._called[name] = now
 

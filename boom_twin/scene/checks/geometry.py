@@ -26,10 +26,8 @@ from . import Draft, Findings
 
 ROUNDING = 1e-9  # m, deg
 RIGID = (math.inf, -math.inf)  # ends of the flexible part of a rigid section: every pin is on its root and on its head
-STEP_DEG = 0.1
 TRANSMISSION_DEG = 5.0  # least angle between the links at Q; forces in them are then 11 times those across
 LEVER = 0.25  # least lever ds/dphi over the largest; the cylinder's force is then 4 times the least one
-OPEN_DEG = 15.0  # between the links, where the largest lever counts: next to a dead centre it grows beyond all bounds
 MIRRORED = ("side", "cy", "dy", "ey", "left")  # numbers of a linkage that change their sign
 UNMET = "the links lL and lR, between D and E, do not meet at"
 NEXT_TO = "next to a dead centre"
@@ -126,8 +124,9 @@ def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Findings:
 
 def grid_of(joint: Joint) -> Array:
     """Return the angles (deg) over the range of a joint."""
+    step_deg = 0.1
     low, high = joint.range_deg
-    return np.linspace(low, high, 1 + math.ceil((high - low) / STEP_DEG))
+    return np.linspace(low, high, 1 + math.ceil((high - low) / step_deg))
 
 
 def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array, lengths: Array) -> Findings:
@@ -160,8 +159,9 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
 
 def _dead_centres(row: np.record, degrees: Array, reached: Mask) -> tuple[Mask, list[str]]:
     """Return a mask of the angles next to a dead centre, and the sentences that say so."""
+    open_deg = 15.0  # between the links, where the largest lever counts: next to a dead centre it grows beyond all bounds
     _, levers, between = joint_curve(row, np.radians(degrees))
-    counted = levers[reached & (between >= OPEN_DEG)]
+    counted = levers[reached & (between >= open_deg)]
     largest = float(counted.max()) if counted.size else float(np.nanmax(np.where(reached, levers, np.nan), initial=0.0))
     flat, weak, told = reached & (between < TRANSMISSION_DEG), reached & (levers < LEVER * largest), []
     if flat.any():
@@ -273,7 +273,6 @@ def intervals(degrees: Array, mask: Mask) -> str:
 # -- pins in the way of a cylinder ----------------------------------------------------------------------------------------
 
 PIN = 0.5  # diameter of a pin over the bore
-WALL = 0.12  # of a barrel, over its bore
 BARREL = 0.9  # of the closed length; the rest is the rod's end and its eye
 
 
@@ -323,13 +322,14 @@ def _finding(draft: Draft, scene: Scene, i: int, worst: Pass, degrees: Array, cl
 
 def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) -> Iterator[Pass]:
     """Return the pins beside the cylinder's own two, in the axes of its carrier, as complex numbers x + iy, m."""
+    wall = 0.12  # of a barrel, over its bore
     pins = joint_pins(scene, i, phi)
     foot, rod_pin = pins.pop("C" if i else "cylinder_pin"), pins.pop(rod_pin_of(pins))
     length = np.abs(rod_pin - foot)
     for name, pin in (pins | _pins_before(scene, i, pins["the pivot"])).items():
         distance, place = distances_to(pin, foot, rod_pin)
         at_barrel = place * length < BARREL * cylinder.closed_length
-        radius = np.where(at_barrel, (0.5 + WALL) * oil.bore, 0.5 * oil.rod)
+        radius = np.where(at_barrel, (0.5 + wall) * oil.bore, 0.5 * oil.rod)
         yield Pass(name, distance, radius + 0.5 * PIN * oil.bore, at_barrel)
 
 

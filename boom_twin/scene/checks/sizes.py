@@ -19,8 +19,6 @@ LENGTHS = ("length", "beam", "height", "rod_pin", "com", "pivot", "cylinder_pin"
            "closed_length", "max_stroke")  # fmt: skip
 BULK = (4e8, 2.5e9)  # Pa; water has 2.2e9
 TURNS = "the joint turns by"
-NARROW = 25.0  # deg; joints of booms turn by 60 and more
-TILT = 1e-3  # of gravity against -y, rad
 
 
 class Suspect(NamedTuple):
@@ -107,21 +105,23 @@ def _value(draft: Draft, place: Place, value: Any) -> Findings:
 
 
 def _narrow(draft: Draft, place: Place, value: tuple[float, float]) -> Findings:
+    narrow = 25.0  # deg; joints of booms turn by 60 and more
     if max(map(abs, value)) < 6.3:
         shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in value)
         yield draft.warning(place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
-    elif 0.0 < value[1] - value[0] < NARROW:
-        bound = f"{TURNS} {value[1] - value[0]:.3g} deg in all; expected at least {NARROW:g} deg"
+    elif 0.0 < value[1] - value[0] < narrow:
+        bound = f"{TURNS} {value[1] - value[0]:.3g} deg in all; expected at least {narrow:g} deg"
         yield draft.warning(place, value, bound, "Give the lowest and the highest joint angle in degrees; check the decimals.")
 
 
 def _gravity(draft: Draft) -> Findings:
+    tilt = 1e-3  # of gravity against -y, rad
     gravity, wrong = draft.scene.gravity, ""
     if not 9.7 < math.hypot(*gravity) < 9.9:
         wrong = "its size is not that of the earth's gravity, about 9.81 m/s^2"
     elif gravity[1] > 0:
         wrong = "it points upwards"
-    elif abs(gravity[0]) > TILT * abs(gravity[1]):
+    elif abs(gravity[0]) > tilt * abs(gravity[1]):
         wrong = "it does not point along -y, which is down"
     if wrong:
         yield draft.warning(("gravity",), gravity, wrong, "Give [0.0, -9.81]; a slope is base.inclination, rad.")
@@ -131,14 +131,8 @@ def _gravity(draft: Draft) -> Findings:
 
 WALL = 20.7  # the wall of a thin box is A^2/(I WALL) of its depth, DEPTH_BY_GYRATION radii of gyration
 SLACK = 1e-3  # of a value that was rounded
-LEAST_BEAM = 0.6  # of the length
-LONGEST_HEAD = 0.125  # of the length
 STEEL, STEEL_E = 7850.0, (1.9e11, 2.2e11)
-STEEL_RHO = (7700.0, 8000.0)  # densities that only steel has
 SPECIFIC_STIFFNESS = (8e6, 1.2e8)  # E / rho, m^2/s^2: glass fibre 1e7, metals 2.6e7, carbon fibre 9e7
-OVERHANG = 0.05  # of the section's length, that a rigid part may reach beyond the pivots
-BESIDE = 2.0  # depths of the section, that a centre may lie beside its axis
-LIGHTEST_PART, LONG_PART = 0.2, 0.03  # of the beam's mass per metre, in parts longer than a share of the section
 
 
 class Ratio(NamedTuple):
@@ -233,9 +227,10 @@ def density(scene: Scene) -> float | None:
 
 def material(draft: Draft) -> Findings:
     """Check Young's modulus against the density."""
+    steel_rho = (7700.0, 8000.0)  # densities that only steel has
     scene = draft.scene
     rho = scene.material.rho
-    of_steel = 1.0 if rho is not None and _between(rho, STEEL_RHO) else None
+    of_steel = 1.0 if rho is not None and _between(rho, steel_rho) else None
     yield from _judged(draft, MATERIAL, ("material",), E=scene.material.E, rho=rho, of_steel=of_steel)
 
 
@@ -257,14 +252,16 @@ def beams(draft: Draft) -> Findings:
 
 
 def _ends(draft: Draft, i: int, length: float, beam: Point) -> Findings:
+    longest_head = 0.125  # of the length
+    least_beam = 0.6  # of the length
     place: Place = ("sections", i, "beam")
     (x0, x1), head = beam, length - beam[1]
-    if x0 > 0.0 and x0 + x1 <= length * (1.0 + 1e-6) and head > LONGEST_HEAD * length:
-        bound = f"[x0, x1] leave a rigid head of {head:.3g} m; expected at most {LONGEST_HEAD * length:.3g} m"
+    if x0 > 0.0 and x0 + x1 <= length * (1.0 + 1e-6) and head > longest_head * length:
+        bound = f"[x0, x1] leave a rigid head of {head:.3g} m; expected at most {longest_head * length:.3g} m"
         remedy = f"x1 is measured from the inboard pivot; if {x1:g} m is the length of the beam, then x1 = {x0 + x1:g}."
         yield draft.warning(place, beam, bound, remedy)
-    elif x1 - x0 < LEAST_BEAM * length:
-        bound = f"{x1 - x0:.3g} m bend of {length:g} m; expected at least {LEAST_BEAM * length:.3g} m"
+    elif x1 - x0 < least_beam * length:
+        bound = f"{x1 - x0:.3g} m bend of {length:g} m; expected at least {least_beam * length:.3g} m"
         yield draft.warning(place, beam, bound, "Give [x0, x1] from the inboard pivot: where the box begins and ends.")
 
 
@@ -280,19 +277,22 @@ def rigid_parts(draft: Draft) -> Findings:
 
 def _part(draft: Draft, place: tuple[str, int, str], part: RigidPart, span: tuple[float, float]) -> Findings:
     """Check centre, inertia and mass: at least that of a share of as much beam, at most that of a solid block of its depth."""
+    lightest_part, long_part = 0.2, 0.03  # of the beam's mass per metre, in parts longer than a share of the section
+    beside = 2.0  # depths of the section, that a centre may lie beside its axis
+    overhang = 0.05  # of the section's length, that a rigid part may reach beyond the pivots
     section, length = draft.scene.sections[place[1]], span[1] - span[0]
     depth = section.depth
-    more = OVERHANG * section.length
+    more = overhang * section.length
     low, high = span[0] - more, span[1] + more
-    if not low <= part.com[0] <= high or abs(part.com[1]) > BESIDE * depth:
-        bound = f"expected inside the {place[2]}: x from {low:.3g} to {high:.3g} m, y within {BESIDE * depth:.2g} m"
+    if not low <= part.com[0] <= high or abs(part.com[1]) > beside * depth:
+        bound = f"expected inside the {place[2]}: x from {low:.3g} to {high:.3g} m, y within {beside * depth:.2g} m"
         remedy = "The centre of mass is measured from the INBOARD pivot, in the axes of the section."
         yield draft.warning((*place, "com"), part.com, bound, remedy)
         return
     own = {"length": length, "depth": depth, "radius": math.sqrt(part.inertia / part.mass)}
     own |= {"mass": part.mass, "inertia": part.inertia, "size": math.hypot(length + more, 2.0 * depth)}
-    if length > LONG_PART * section.length:
-        own["lightest"] = LIGHTEST_PART * (section.rho_A or 0.0) * length
+    if length > long_part * section.length:
+        own["lightest"] = lightest_part * (section.rho_A or 0.0) * length
     if (rho := density(draft.scene)) is not None:
         own["heaviest"] = rho * depth**2 * (length + 2.0 * depth)
     yield from _judged(draft, RIGID_PART, place, **own)

@@ -16,10 +16,7 @@ LINK_KEYS = ("C", "D", "E", "lL", "lR")
 SIX_BAR_ONLY = (*LINK_KEYS, "side", "R", "mL", "mR")
 NEEDED = {"A": (), "B1": LINK_KEYS, "B2": (*LINK_KEYS, "R"), "B3": (*LINK_KEYS, "R")}
 """Keys of a joint by its kind."""
-ROD_BY_BORE = (0.4, 0.92)  # rods that may be pushed; the series of ISO 7181 has 0.45 to 0.89 for ratios of areas from 1.25 on
 PLACES = {"cylinder": ("rod", "barrel"), "joint": ("pivot", "link_L", "link_R", "Q")}
-NEAR_RESTITUTION = 0.02  # between the restitution that is asked for and the one that a law gives
-WIDE_CLEARANCE = 0.1  # of the pin's radius; contact of a journal in a bush is meant for much less
 
 
 def counts(draft: Draft) -> Findings:
@@ -139,6 +136,7 @@ def _keys_of_kind(draft: Draft, i: int, joint: Joint) -> Findings:
 
 
 def _oil_spring(draft: Draft, i: int, cylinder: Cylinder) -> Findings:
+    rod_by_bore = (0.4, 0.92)  # ISO 7181 has 0.45 to 0.89 for ratios of areas from 1.25 on
     place, oil = ("joints", i, "cylinder"), cylinder.oil
     if cylinder.d is not None and not cylinder.is_compressible:
         bound = "a damper acts in parallel with the oil spring, and k is absent: the cylinder is incompressible"
@@ -154,7 +152,7 @@ def _oil_spring(draft: Draft, i: int, cylinder: Cylinder) -> Findings:
         yield draft.fault((*place, "oil", "rod"), oil.rod, bound, "Give both as diameters in m.")
     else:
         where, remedy = f" m in a bore of {oil.bore:g} m", "Give both as diameters in m, not one as a radius."
-        yield from draft.expect((*place, "oil", "rod"), oil.rod, ROD_BY_BORE, oil.bore, where, remedy)
+        yield from draft.expect((*place, "oil", "rod"), oil.rod, rod_by_bore, oil.bore, where, remedy)
     for key, end in (("cap_line", "stroke 0"), ("rod_line", f"its full stroke, {cylinder.max_stroke:g} m")):
         if getattr(oil, key) == 0.0:
             bound = f"no oil is left there at {end}, and the cylinder is incompressible"
@@ -176,11 +174,13 @@ def _several(number: int, noun: str) -> str:
 
 def worn_pins(draft: Draft) -> Findings:
     """Check that every pin of the block is a pin of the boom, named once, with a clearance that fits its radius."""
+    wide_clearance = 0.1  # of the pin's radius; contact of a journal in a bush is meant for much less
+    near_restitution = 0.02  # between the restitution that is asked for and the one that a law gives
     scene, block = draft.scene, draft.scene.clearance
     if block is None:
         return
     law = block.contact
-    if "restitution" in law.model_fields_set and abs(law.given_restitution - law.restitution) > NEAR_RESTITUTION:
+    if "restitution" in law.model_fields_set and abs(law.given_restitution - law.restitution) > near_restitution:
         bound = f"the law {law.law} really gives {law.given_restitution:.3f}"
         remedy = "Take the law hunt-crossley-exact, which gives what is asked for."
         yield draft.warning(("clearance", "contact", "restitution"), law.restitution, bound, remedy)
@@ -198,7 +198,7 @@ def worn_pins(draft: Draft) -> Findings:
         if share >= 1.0:
             bound = f"it must be less than pin_radius = {pin.pin_radius:g} m"
             yield draft.fault((*place, "radial_clearance"), pin.radial_clearance, bound, "Give it in metres.")
-        elif share > WIDE_CLEARANCE:
+        elif share > wide_clearance:
             bound = f"it is more than a tenth of pin_radius = {pin.pin_radius:g} m, for which the contact law is not meant"
             yield draft.warning((*place, "radial_clearance"), pin.radial_clearance, bound, "Give both in metres.")
 

@@ -25,13 +25,8 @@ from ..schema import Scene
 from . import Draft, Findings
 
 FREQUENCY = (4.0, 70.0)  # first one times the length of the boom, m/s
-PART_DAMPING = (2e-4, 0.2)  # what one part alone would give the first mode, at least, and the second, at most
 QUICK = 5.0  # Hz; of a short boom, whose second mode is above, the first mode or this frequency counts
 PRESSURE = (2.0, 45.0)  # MPa, of the chamber that bears the stretched-out boom; placing booms have up to 30 to 40 MPa
-GIVE = 0.02  # of the stroke, by which the oil gives way under the weight of the boom
-OIL, WIDEST_BORE = 1.5e9, 0.8  # bulk modulus, Pa; bore that a constant k needs, of the height of the section it lies along
-TINY = 1e-300
-MOST_PAYLOAD = 0.5  # of the boom's mass
 
 
 TAKES = frozenset(
@@ -68,6 +63,8 @@ def _frequency(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
 
 def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
     """Yield warnings of the damping of each part, then of all together; none where no damping is given at all."""
+    tiny = 1e-300
+    part_damping = (2e-4, 0.2)  # what one part alone would give the first mode, at least, and the second, at most
     if not len(found.frequencies):
         return
     parts: list[tuple[Place, float, float]] = []
@@ -81,10 +78,10 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
         parts.append((("base", "damping"), scene.base.damping, scene.base.damping / scene.base.stiffness))
     slow, quick = found.frequencies[[0, min(1, len(found.frequencies) - 1)]].tolist()
     first, second = math.pi * slow, math.pi * max(slow, min(quick, QUICK))
-    odd = [part for part in parts if first * part[2] < PART_DAMPING[0] or second * part[2] > PART_DAMPING[1]]
+    odd = [part for part in parts if first * part[2] < part_damping[0] or second * part[2] > part_damping[1]]
     for place, value, delay in odd:
-        pace = second if delay * second > PART_DAMPING[1] else first
-        low, high = (limit * value / (each * delay or TINY) for limit, each in zip(PART_DAMPING, (first, second), strict=True))
+        pace = second if delay * second > part_damping[1] else first
+        low, high = (limit * value / (each * delay or tiny) for limit, each in zip(part_damping, (first, second), strict=True))
         damped = f"a mode of {pace / math.pi:.2g} Hz by {100 * pace * delay:.2g} %"
         bound = f"alone it would damp {damped}; expected {low:.2g} to {high:.2g}"
         remedy = "beta is 2 zeta / omega (s), zeta the damping ratio; d, and damping of a base, are that times the stiffness."
@@ -107,10 +104,11 @@ def _pressure(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
 
 
 def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
+    give = 0.02  # of the stroke, by which the oil gives way under the weight of the boom
     for i, joint in enumerate(scene.joints):
         k, lever = middle_stiffness(joint.cylinder), abs(float(found.levers[i]))
         if math.isfinite(k) and lever > 0.0:
-            force, most = float(found.moments[i]) / lever, GIVE * joint.cylinder.max_stroke
+            force, most = float(found.moments[i]) / lever, give * joint.cylinder.max_stroke
             if force > k * most:
                 bound = (
                     f"stretched out, the boom loads the cylinder with about {force / 1e3:.3g} kN, and its oil gives way by "
@@ -122,19 +120,21 @@ def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
 
 def _stiff(draft: Draft, scene: Scene, _found: StraightBoom) -> Findings:
     """Check a constant k against the cylinder that could have it: amid its stroke s, k = 4 B A / s."""
+    oil, widest_bore = 1.5e9, 0.8  # bulk modulus, Pa; bore that a constant k needs, of the height of the section it lies along
     for i, joint in enumerate(scene.joints):
         k, depth = joint.cylinder.k or 0.0, scene.sections[max(0, i - 1)].depth
-        bore = math.sqrt(k * joint.cylinder.max_stroke / (math.pi * OIL))
+        bore = math.sqrt(k * joint.cylinder.max_stroke / (math.pi * oil))
         says = f"amid its stroke a cylinder has it with a bore of {bore:.2g} m; "
         where, remedy = f" m beside a section {depth:.2g} m high", "Check k (N/m), and its decimals."
-        place, limits = ("joints", i, "cylinder", "k"), (0.0, WIDEST_BORE)
+        place, limits = ("joints", i, "cylinder", "k"), (0.0, widest_bore)
         yield from draft.expect(place, k, limits, depth, where, remedy, measured=bore, says=says)
 
 
 def _payload(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
+    most_payload = 0.5  # of the boom's mass
     if (boom := found.mass - scene.payload) > 0.0:
         where, remedy = " kg, half of what the boom weighs", "Give kg; concrete in the pipe line is line_fill."
-        yield from draft.expect(("tip", "payload"), scene.payload, (0.0, MOST_PAYLOAD), boom, where, remedy)
+        yield from draft.expect(("tip", "payload"), scene.payload, (0.0, most_payload), boom, where, remedy)
 
 
 # -- estimate of the stretched-out boom ----------------------------------------------------------------------------------
