@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..types import Array
 
 BREAK = 1.0  # step of time, s, that is not bridged; neither is a step back
+SEGMENT = 8.0  # of Welch's method, s; lines of a spectrum are 1/SEGMENT apart
 
 
 def unbroken(times: Array) -> list[slice]:

@@ -27,7 +27,7 @@ from ..messages.topic_table import Topics
 from ..types import NANO, SECOND, SENSORS, Array, Sample, Stream, channels_of, sensor_kind, stream_of
 from .metadata import dump
 from .session_model import SessionSheet
-from .session_writer import BY_NAME, LogTimes, named_message
+from .session_writer import LogTimes, named_message
 from .writer import MessageWriter
 
 TOGETHER = 4096  # messages encoded at once
@@ -257,7 +257,7 @@ def _kinds(readings: Readings, topics: Topics, joints: int) -> list[_Kind]:
     stream, sensors = readings.stream, topics.sensors_of(readings.stream, joints)
     named = np.array([channel not in topics.absent for channel in sensors]) & readings.own
     masks = np.broadcast_to(named, readings.values.shape)
-    if readings.is_apart and SENSORS[stream].message == BY_NAME:
+    if readings.is_apart and SENSORS[stream].is_named:
         masks = masks & np.isfinite(readings.values)
     patterns, kinds = np.unique(masks, axis=0, return_inverse=True)
     found = []

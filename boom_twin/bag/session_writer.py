@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..errors import BagError, UsageError
 from ..messages.mapping import load_mapping
+from ..messages.sample_decoder import NO_MEASUREMENT
 from ..messages.topic_table import FRAME, Topics, every_input, factor
 from ..messages.type_store import fill_header, jazzy, new_message
 from ..scene.load import SceneSource
@@ -67,7 +68,6 @@ def samples_in_rows(
 
 def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
     """Return the message that a rig's sensor sends. An Imu has the acceleration in the plane, and the `rate` (1,) if given."""
-    unknown = -1.0  # first element of a covariance: the quantity is not measured (REP-145)
     kind = SENSORS[sample.stream]
     msg = new_message(kind.message)
     if not kind.is_named:
@@ -76,9 +76,9 @@ def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
             msg.point.x, msg.point.z = map(float, sample.values)
             return msg
         msg.orientation.w = 1.0
-        msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = unknown
+        msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = NO_MEASUREMENT
         if kind.beside:
-            rate, msg.linear_acceleration_covariance[0] = sample.values, unknown
+            rate, msg.linear_acceleration_covariance[0] = sample.values, NO_MEASUREMENT
         else:
             msg.linear_acceleration.x, msg.linear_acceleration.z = map(float, sample.values)
         if rate is not None:
@@ -92,7 +92,6 @@ def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
 
 
 CLOCK_SET = SECOND  # step back of a stamp (ns) above which a clock was set; a smaller one is a late row
-BY_NAME = "sensor_msgs/msg/JointState"
 
 
 class LogTimes:
@@ -121,7 +120,7 @@ def named_message(sample: Sample, names: Sequence[str]) -> Any:
     """Return the message of a sensor with names by a mapping, or Imu axes. A value without a name is left out."""
     msg, kind = sensor_message(sample), SENSORS[sample.stream]
     pairs = [(name, float(value)) for name, value in zip(names, sample.values, strict=True) if name]
-    if kind.message == BY_NAME:
+    if kind.is_named:
         msg.name = [name for name, _ in pairs]
         setattr(msg, kind.field, np.array([value for _, value in pairs]))
         return msg

@@ -18,13 +18,14 @@ from scipy.stats import t as student
 from ..plots.results import Trend, trends_picture
 from ..report.fatigue import LIVES, hours_as_text, hours_to_end, yearly_as_text
 from ..report.html import render
+from ..report.page import HOUR
 from ..system.atomic_files import write_atomic
 from ..system.result_text import json_text
 from ..types import SECOND, sensor_kind
 from .folder import SESSIONS
 from .session_task import OK, Row
 
-HOUR, DAY = 3600.0, 86400.0  # s
+DAY = 86400.0  # s
 DAMAGE = "fatigue_damage_"  # prefix of the columns with the damage of a station
 DRIFTING = ("residual_mean_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
 """Prefixes of the figures whose drift is computed."""

@@ -65,7 +65,10 @@ def run(args: Namespace) -> int:
             tell(line)
         raise SceneError(name, tuple(oddity for oddity in oddities if not oddity.is_note))
     account = explain(scene)
-    values, lines = summary(name, account, oddities) | _restitutions(scene), report(name, scene, account, oddities)
+    values, lines = summary(name, account, oddities), report(name, scene, account, oddities)
+    if scene.clearance is not None:
+        law = scene.clearance.contact
+        values |= {"restitution": law.restitution, "restitution_given": law.given_restitution}
     if args.need is not None:
         result = need.search(scene, args.need)
         values |= need.summary(result, args.need)
@@ -107,20 +110,11 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "lever_least_m": [joint.linkage.lever[0] for joint in joints],
         "lever_greatest_m": [joint.linkage.lever[1] for joint in joints],
         "transmission_least_deg": [joint.linkage.transmission_deg for joint in joints],
-        "nearest_pins_m": [None if joint.linkage.nearest is None else joint.linkage.nearest.distance for joint in joints],
         "oil_stiffness_N_m": [list(joint.k_over_stroke) for joint in joints],
         "left_out": [f"{item.key}: {item.meaning}" for item in account.left_out],
         "warnings": [str(oddity) for oddity in oddities if not oddity.is_note],
         "notes": [str(oddity) for oddity in oddities if oddity.is_note],
     }
-
-
-def _restitutions(scene: Scene) -> dict[str, float]:
-    """Return the requested restitution and that of the contact law; empty without clearance."""
-    if scene.clearance is None:
-        return {}
-    law = scene.clearance.contact
-    return {"restitution": law.restitution, "restitution_given": law.given_restitution}
 
 
 def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault]) -> list[str]:
@@ -132,15 +126,17 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     lines += [f"  {count} section{'s' * (count > 1)}, {kinds}, {scene.reach:.2f} m, {account.mass:.1f} kg"]
     lines += _base(scene.base)
     lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_masses(account)]
-    lines += ["", "Sections", *_sections(account)]
+    sections = [[f"section {section.number}", _section_words(section)] for section in account.sections]
+    lines += ["", "Sections", *_table(sections, left=2)]
     lines += ["", "Joints and cylinders", *_cylinders(account)]
-    lines += ["", "Joints over their range: lever of the cylinder, angle of the links, nearest pins"]
+    lines += ["", "Joints over their range: lever of the cylinder, angle of the links"]
     lines += _linkages(account)
     if any(joint.k_over_stroke for joint in account.joints):
         lines += ["", "Stiffness of the oil over the stroke, kN/mm", *_over_stroke(account)]
     if scene.clearance is not None and account.pins:
         lines += ["", _clearance_title(scene.clearance), *_pins(account)]
-    lines += ["", "Left out of the model (absent from the scene, zero or false)", *_left_out(account)]
+    left_out = [[item.key, item.meaning] for item in account.left_out]
+    lines += ["", "Left out of the model (absent from the scene, zero or false)", *_table(left_out, left=2)]
     lines += ["", f"Unknowns per step: {account.unknowns}", *_unknowns(account)]
     warnings = [oddity for oddity in oddities if not oddity.is_note]
     lines += ["", *(f"Note: {oddity}" for oddity in oddities if oddity.is_note)]
@@ -168,10 +164,6 @@ def _masses(account: Account) -> list[str]:
         rows.append(["payload", *[""] * 8, f"{account.scene.payload:.1f}"])
     rows.append(["total", f"{account.scene.reach:.2f}", *[""] * 7, f"{account.mass:.1f}"])
     return _table(rows)
-
-
-def _sections(account: Account) -> list[str]:
-    return _table([[f"section {section.number}", _section_words(section)] for section in account.sections], left=2)
 
 
 def _section_words(section: SectionAccount) -> str:
@@ -210,15 +202,13 @@ def _oil(joint: JointAccount) -> str:
 
 
 def _linkages(account: Account) -> list[str]:
-    rows = [["", "lever m", "links meet at", "nearest pins"]]
+    rows = [["", "lever m", "links meet at"]]
     for joint in account.joints:
         own = joint.linkage
         links = "-" if own.transmission_deg is None else f"{own.transmission_deg:.0f} deg at least"
-        near = own.nearest
-        pins = "-" if near is None else f"{near.first}-{near.second} {near.distance:.3f} m at {near.degrees:.0f} deg"
         lever = f"{own.lever[0]:.3f} to {own.lever[1]:.3f}"
-        rows.append([f"joint {joint.number}", lever, links, pins.replace("the ", "")])
-    return _table(rows, left=4)
+        rows.append([f"joint {joint.number}", lever, links])
+    return _table(rows, left=3)
 
 
 def _over_stroke(account: Account) -> list[str]:
@@ -241,10 +231,6 @@ def _pins(account: Account) -> list[str]:
     rows = [["", "pin radius mm", "radial clearance mm"]]
     rows += [[pin.at, f"{1e3 * pin.pin_radius:g}", f"{1e3 * pin.radial_clearance:g}"] for pin in account.pins]
     return _table(rows)
-
-
-def _left_out(account: Account) -> list[str]:
-    return _table([[item.key, item.meaning] for item in account.left_out], left=2)
 
 
 def _unknowns(account: Account) -> list[str]:

@@ -8,7 +8,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from ..errors import UsageError
-from .output import print_result, tell
+from .output import tell
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -25,7 +25,7 @@ def run(args: Namespace) -> int:
         size = sum(map(_size, found))
         for each in found:
             shutil.rmtree(each)
-        print_result(False, {}, [f"removed {len(found)} folders of compiled kernels, {size:.1f} MB, from {cache_root()}"])
+        print(f"removed {len(found)} folders of compiled kernels, {size:.1f} MB, from {cache_root()}")
         return 0
     folder = cache_folder()
     if (fault := fault_of(folder)) is not None:
@@ -39,9 +39,7 @@ def run(args: Namespace) -> int:
     Twin(load_scene(), health=True).warm_up()
     kernels = len(list(folder.glob(f"*{SUFFIX}")))
     told = f"{kernels - before} compiled now" if kernels > before else "nothing to compile"
-    print_result(
-        False, {}, [f"{kernels} kernels in {folder}, {_size(folder):.1f} MB; {told}, {time.perf_counter() - began:.1f} s"]
-    )
+    print(f"{kernels} kernels in {folder}, {_size(folder):.1f} MB; {told}, {time.perf_counter() - began:.1f} s")
     return 0
 
 

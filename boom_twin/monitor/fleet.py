@@ -14,12 +14,13 @@ from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from http import HTTPStatus
-from importlib import import_module
 from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
 from aiohttp import ClientError, ClientSession, ClientTimeout
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
 from ..errors import UsageError
 from ..twin.blocks import EVENTS
@@ -177,7 +178,6 @@ class AlarmWatch:
 
 WINDOW = 10.0  # window (s) of the root mean square of residuals
 AXES = ("x", "z")
-REMEDY = 'prometheus_client is not installed, and /metrics needs it. Run `pip install "boom_twin[monitor]"`.'
 
 
 class Metrics:
@@ -202,14 +202,10 @@ class Metrics:
             self._samples, self._grew = self._samples + new, time.monotonic()
 
     def text(self) -> tuple[bytes, str]:
-        """Return all metrics and their content type; raise UsageError if `prometheus_client` is not installed."""
-        try:
-            client = import_module("prometheus_client")
-        except ImportError:
-            raise UsageError(REMEDY) from None
-        registry = client.CollectorRegistry()
+        """Return all metrics and their content type."""
+        registry = CollectorRegistry()
         registry.register(self)
-        return client.generate_latest(registry), client.CONTENT_TYPE_LATEST
+        return generate_latest(registry), CONTENT_TYPE_LATEST
 
     def describe(self) -> list[Any]:
         """Return no descriptions: they depend on the sensors of the boom."""
@@ -303,13 +299,13 @@ class Metrics:
         return table.rows(table.until(table.newest - WINDOW), table.count)[1].astype(float)
 
     def _gauge(self, name: str, words: str, rows: Any, *labels: str) -> Any:
-        return self._family("GaugeMetricFamily", name, words, rows, labels)
+        return self._family(GaugeMetricFamily, name, words, rows, labels)
 
     def _counter(self, name: str, words: str, rows: Any, *labels: str) -> Any:
-        return self._family("CounterMetricFamily", name, words, rows if isinstance(rows, list) else [((), rows)], labels)
+        return self._family(CounterMetricFamily, name, words, rows if isinstance(rows, list) else [((), rows)], labels)
 
-    def _family(self, kind: str, name: str, words: str, rows: list[tuple[tuple[str, ...], float]], labels: Any) -> Any:
-        found = getattr(import_module("prometheus_client.core"), kind)(f"boom_twin_{name}", words, labels=("boom", *labels))
+    def _family(self, kind: Any, name: str, words: str, rows: list[tuple[tuple[str, ...], float]], labels: Any) -> Any:
+        found = kind(f"boom_twin_{name}", words, labels=("boom", *labels))
         for values, number in rows:
             found.add_metric((self._feed.boom, *values), number)
         return found

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from aiohttp import web
 
-from ..errors import UsageError
 from ..texts import FILE as TEXTS
 from . import PORT
 from .access_control import POLICY, AccessControl, Connection, Connections, in_address
@@ -66,10 +65,7 @@ class Server:
         return web.FileResponse(file)
 
     async def _answer_metrics(self, request: web.Request) -> web.Response:
-        try:
-            body, kind = self._metrics.text()
-        except UsageError as error:
-            raise web.HTTPNotImplemented(text=str(error)) from None
+        body, kind = self._metrics.text()
         return web.Response(body=body, headers={"Content-Type": kind})
 
     async def _connect(self, request: web.Request) -> web.StreamResponse:

@@ -33,20 +33,28 @@ from .replay import Replay
 def draw(result: Replay, history: History, scene: Scene, out: Path) -> list[Path]:
     """Draw the pictures of a replay, of which `history` is made, into `out`; returns their paths."""
     middles = tuple(UndeflectedBoom(scene, compile_scene(scene)).middles)
-    history = replace(history, natural=_natural(history, scene), section_middles=middles)
+    _, natural = course(history, scene, POSTURES)
+    natural = natural[:, np.isfinite(natural).any(axis=0)]
+    ranges = np.column_stack([np.nanmin(natural, axis=0), np.nanmax(natural, axis=0)])
+    history = replace(history, natural=ranges, section_middles=middles)
     notes = result.session.notes
     note = notes.get("origin", "")
     truth = _truth(result.truth, history)
     return replay_pictures(out, history, truth, session=result.session.path.resolve().name, note=note)
 
 
-def _natural(history: History, scene: Scene) -> Array:
-    """Return the least and the largest of each natural frequency (Hz) over the session's postures, shape (modes, 2)."""
+def course(history: History, scene: Scene, most: int) -> tuple[Array, Array]:
+    """Return `most` even times (k,) in s, or all, and the model's natural frequencies there (k, modes), Hz.
+
+    A frequency is NaN where there is no equilibrium, and beyond the last mode.
+    """
     modes, count = ModeList(scene), len(history.stamps_s)
-    places = np.unique(np.linspace(0, count - 1, min(count, POSTURES)).astype(int))
-    rows = [found for place in places if (found := modes.at(history.strokes[place].tolist()))]
-    columns = list(zip(*rows, strict=False))
-    return np.array([(min(column), max(column)) for column in columns]).reshape(-1, 2)
+    places = np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
+    rows = [modes.at(history.strokes[place].tolist()) for place in places]
+    table = np.full((len(rows), max(map(len, rows))), np.nan)
+    for row, found in zip(table, rows, strict=True):
+        row[: len(found)] = found
+    return history.stamps_s[places], table
 
 
 POSTURES = 9  # postures of a session whose natural frequencies are computed

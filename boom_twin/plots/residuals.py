@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.sample_series import ColumnStatistics, power_density, spacing, unbroken
+from ..analysis.sample_series import SEGMENT, ColumnStatistics, power_density, spacing, unbroken
 from ..types import Array, sensor_kind
 from .history import Density, History, ResidualDistribution, SessionDistributions
 from .style import BLUE, GREY, INK, ORANGE, PURPLE, SKY, TIME, extent, legend_above, picture, shade_alarms, shade_gaps
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 
 EDGES = np.linspace(-5.0, 5.0, 51)  # edges of the bins of normalised residuals; residuals outside count in the outermost bins
-SEGMENT = 8.0  # s; lines of a spectrum are 1/SEGMENT apart
 
 
 class SessionDistributionsBuilder:

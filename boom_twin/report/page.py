@@ -11,6 +11,7 @@ import numpy as np
 from .. import __version__
 from ..analysis.free_vibration import Vibration
 from ..health.sensor_monitor import noise_as_text
+from ..offline.history import course
 from ..offline.recording import Recording
 from ..plots import AlarmSpan
 from ..plots.results import frequency_picture, moment_picture, timeline_picture
@@ -23,7 +24,7 @@ from .evaluation import Evaluation
 from .fatigue import LIVES, NOISE_RANGE, hours_as_text, hours_to_end, yearly_as_text
 from .html import render
 from .quantities import Load
-from .vibration import MODE_DISTANCE, SHORTEST_REST, course
+from .vibration import MODE_DISTANCE, SHORTEST_REST
 
 FILE_NAME = "report.html"
 HOUR = 3600.0  # s
@@ -96,7 +97,7 @@ def _draw(found: Evaluation, folder: Path, name: str, origin: str) -> None:
         spans = sorted([*gaps, *history.alarms], key=lambda alarm: alarm.start)
         timeline_picture(folder / "timeline.png", name, float(history.stamps_s[-1]), spans, origin)
     peaks = [(0.5 * (rest.start + rest.stop), each.frequency) for rest in found.rests for each in rest.measured.values()]
-    frequency_picture(folder / "frequencies.png", name, *course(history, found.scene), peaks, origin)
+    frequency_picture(folder / "frequencies.png", name, *course(history, found.scene, 60), peaks, origin)
     if found.loads:
         worst = {load.station.section: (load.station.name, load.column) for load in reversed(found.loads)}
         moment_picture(folder / "moments.png", name, history, [worst[section] for section in sorted(worst)], origin)

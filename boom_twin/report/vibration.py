@@ -130,18 +130,6 @@ class RestFinder:
         return RestPeriod(start, stop, model, _by_mode(certain, model), False)
 
 
-def course(history: History, scene: Scene) -> tuple[Array, Array]:
-    """Return times (k,) in s and the model's natural frequencies (k, modes) at these times; NaN without an equilibrium."""
-    course_points = 60  # times at which the model's frequencies are computed, at most
-    modes, count = ModeList(scene), len(history.stamps_s)
-    places = np.unique(np.linspace(0, count - 1, min(count, course_points)).astype(int))
-    rows = [modes.at(history.strokes[place].tolist()) for place in places]
-    table = np.full((len(rows), max(map(len, rows))), np.nan)
-    for row, found in zip(table, rows, strict=True):
-        row[: len(found)] = found
-    return history.stamps_s[places], table
-
-
 def still(times: Array, strokes: Array) -> list[tuple[float, float]]:
     """Return begin and end (s) of the intervals in which no stroke (k, n) was faster than `STILL_SPEED`."""
     if len(times) < 2:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
-from ..types import Array
-from .kinematics import RANGE_SAMPLES, joint_curve, joint_pins, linkage, stroke_range
+from .kinematics import RANGE_SAMPLES, joint_curve, linkage, stroke_range
 from .oil_spring import stiffness_over_stroke
 from .schema import IDEAL_BELOW, Joint, Pin, Scene, Section
 from .segmentation import Split, flexible_parts, splits
@@ -119,16 +117,6 @@ class SectionAccount:
 
 
 @dataclass(frozen=True)
-class Nearest:
-    """Two pins where they come closest: their names, the distance (m) and the joint's angle (deg)."""
-
-    first: str
-    second: str
-    distance: float
-    degrees: float
-
-
-@dataclass(frozen=True)
 class LinkageAccount:
     """A joint over its range."""
 
@@ -136,29 +124,14 @@ class LinkageAccount:
     """Least and greatest ds/dphi, m."""
     transmission_deg: float | None
     """Least angle between the links; None for kind A."""
-    nearest: Nearest | None
-    """Nearest of the pins that move against each other; None for kind A."""
 
 
 def linkage_account(scene: Scene, i: int) -> LinkageAccount:
     """Return what joint `i` (0-based) of a scene does over its range."""
     row, degrees = linkage(scene, i), np.linspace(*scene.joints[i].range_deg, RANGE_SAMPLES)
-    pins = joint_pins(scene, i, np.radians(degrees))
     _, levers, between = joint_curve(row, np.radians(degrees))
     lever, least = (float(np.nanmin(levers)), float(np.nanmax(levers))), float(np.nanmin(between)) if i else None
-    return LinkageAccount(lever, least, nearest_pins(pins, degrees))
-
-
-def nearest_pins(pins: dict[str, Array], degrees: Array) -> Nearest | None:
-    """Return the two pins of a six-bar that come closest; None for kind A, whose pins are its measures."""
-    if "Q" not in pins:
-        return None
-    found = []
-    for first, second in combinations(pins, 2):
-        distance = np.abs(pins[first] - pins[second])
-        at = int(np.nanargmin(distance))
-        found.append(Nearest(first, second, float(distance[at]), float(degrees[at])))
-    return min(found, key=lambda each: each.distance)
+    return LinkageAccount(lever, least)
 
 
 @dataclass(frozen=True, slots=True)

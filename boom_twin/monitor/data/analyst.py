@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 
 from ...analysis.frequency_response import UPWARD, linearised_boom
 from ...analysis.posture_modes import MOVED, ModeList, PresentPosture
-from ...analysis.sample_series import power_density, spacing
+from ...analysis.sample_series import SEGMENT, power_density, spacing
 from ...analysis.steady_state import TOO_MUCH
 from ...errors import BoomTwinError
 from ...scene.pump_pulses import CHANGE_OVER
@@ -86,7 +86,6 @@ def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
 
 
 SPECTRUM_SPAN = 40.0  # time span of the spectrum, up to the shown time, s
-SEGMENT = 8.0  # segment of Welch's method, s (Hann window, half overlapping, mean removed)
 PROMINENCE = 6.0  # lowest prominence of a peak, dB
 
 
