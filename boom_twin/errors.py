@@ -15,6 +15,7 @@ Kernels never raise: they return a status (see `boom_twin.kernels.tables`), and 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -89,6 +90,12 @@ def _shortened(value: Any, width: int = 60) -> str:
     return text if len(text) <= width else f"{text[: width - 12]} ... {text[-7:]}"
 
 
+def listed(source: str, faults: Sequence[Fault]) -> str:
+    """Return the text of an error that lists the faults of a file."""
+    count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
+    return "\n".join([f"{source}: {count}", *(f"  {fault}" for fault in faults)])
+
+
 class SceneError(BoomTwinError):
     """Error of a scene that cannot be used."""
 
@@ -98,6 +105,4 @@ class SceneError(BoomTwinError):
 
     def __init__(self, source: str, faults: tuple[Fault, ...], oddities: tuple[Fault, ...] = ()) -> None:
         self.source, self.faults, self.oddities = source, faults, oddities
-        count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
-        lines = [f"{source}: {count}", *(f"  {fault}" for fault in faults)]
-        super().__init__("\n".join(lines + [f"  {oddity.kind}: {oddity}" for oddity in oddities]))
+        super().__init__("\n".join([listed(source, faults), *(f"  {oddity.kind}: {oddity}" for oddity in oddities)]))

@@ -107,30 +107,30 @@ class BendingStresses:
     stress_sigmas: Array  # standard deviations by the load at the tip, NaN without an estimate
 
 
-def section_moduli(scene: Scene, heights: Array | None = None) -> Array:
+def section_moduli(scene: Scene) -> Array:
     """Return the section modulus 2 I / height of every section, shape (n,), m^3; NaN of a rigid one.
 
-    `heights` (n,) are outer heights, m. By default they are those of the scene, or those of thin-walled boxes.
+    Heights are those of the scene, or those of thin-walled boxes.
     """
     found = np.full(len(scene.sections), np.nan)
     for i, section in enumerate(scene.sections):
         if scene.is_flexible(i):
             assert section.I is not None
-            found[i] = 2.0 * section.I / (section.depth if heights is None else heights[i])
+            found[i] = 2.0 * section.I / section.depth
     return found
 
 
 class BendingStressModel:
     """Moments and stresses of a boom at its k `stations`, sample by sample; `moduli` (k,) are the section moduli there, m^3.
 
-    For `heights` see `section_moduli`; `reads` says what the strokes of predictions are.
+    `reads` says what the strokes of predictions are.
     """
 
-    def __init__(self, scene: Scene, heights: Array | None = None, reads: StrokeReading = StrokeReading.LENGTH) -> None:
+    def __init__(self, scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> None:
         self.stations: tuple[Station, ...] = stations(scene)
         if not self.stations:
             raise UsageError("sections: none of the scene is flexible, so it has no bending moments. Give a section a beam.")
-        self.moduli = section_moduli(scene, heights)[[station.section for station in self.stations]]
+        self.moduli = section_moduli(scene)[[station.section for station in self.stations]]
         self._plan, self._reads = compile_scene(scene), reads
         self._by_unknowns = moments_by_unknowns(self._plan)
         self._state, self._work = self._plan.state(), self._plan.work()

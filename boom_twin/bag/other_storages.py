@@ -58,7 +58,10 @@ def summarise_sqlite(path: Path) -> SqliteFile:
         tables = {str(name) for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
         if not {"messages", "topics"} <= tables:
             raise BagError(f"{path}: has no tables messages and topics, but {', '.join(sorted(tables)) or 'none'}. {_REMEDY}")
-        definitions = _definitions(database) if "message_definitions" in tables else {}
+        definitions = dict[str, str]()
+        if "message_definitions" in tables:
+            wanted = "SELECT topic_type, encoded_message_definition FROM message_definitions WHERE encoding = 'ros2msg'"
+            definitions = {str(kind): str(text) for kind, text in database.execute(wanted)}
         topics = [_topic(path, row) for row in database.execute("SELECT id, name, type, serialization_format FROM topics")]
         counts = dict(database.execute("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id"))
         if unknown := sorted(map(str, counts.keys() - {number for number, *_ in topics})):
@@ -83,12 +86,6 @@ def _topic(path: Path, row: tuple[Any, ...]) -> tuple[int, str, str, str]:
     if not isinstance(number, int) or not 0 <= number < 2**31 or not all(isinstance(text, str) for text in texts):
         raise BagError(f"{path}: {row!r} in its table topics is no topic. {_REMEDY}")
     return number, texts[0], texts[1], texts[2]
-
-
-def _definitions(database: sqlite3.Connection) -> dict[str, str]:
-    """Return the definitions of messages by type, for those in the language ``ros2msg``."""
-    rows = database.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
-    return {str(kind): str(text) for kind, encoding, text in rows if encoding == "ros2msg"}
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from .. import __version__
 from ..bag.session_model import SessionSheet
 from ..config.settings import DEFAULT_FILE as DEFAULT_PARAMETERS
 from ..config.settings import load_settings, load_thresholds
+from ..config.yaml_text import with_values
 from ..errors import BagError, BoomTwinError
 from ..messages.mapping import load_mapping
 from ..messages.topic_table import DEFAULT_FILE, Topic, Topics
@@ -126,11 +127,9 @@ def _with_twin_values(sheet: SessionSheet, answers: Mapping[str, Any], frame: st
 
     The prefix that the twin puts before the `frame` of the mapping becomes part of the mapping, so that a replay has it too.
     """
-    from ..ros.bag.subscriptions import with_mapped
-
     changes: dict[str, Any] = {"twin": answers["parameters"]} if "parameters" in answers else {}
     if prefix := answers.get("parameters", {}).get("frame_prefix"):
-        changes["mapping"] = with_mapped(sheet.mapping or "", ("frame",), prefix + frame)
+        changes["mapping"] = with_values(sheet.mapping or "", [(("frame",), prefix + frame)])
     own_mapping = answers.get("parameters", {}).get("mapping")
     if own_mapping and (not given_mapping or Path(own_mapping).resolve() != Path(given_mapping).resolve()):
         warn(

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ..config.yaml_text import read_plain
-from ..errors import BagError, Fault, UsageError
+from ..errors import BagError, Fault, UsageError, listed
 from ..types import SENSORS, Stream, channels_of, sensor_kind, stream_of
 from .csv_layout import TIME_UNITS, guess, unit_of
 from .log_table import LogTable
@@ -60,9 +60,7 @@ def columns_from(document: Any, source: str) -> ColumnFile:
     else:
         faults = [*_faults(found)]
     if faults:
-        raise UsageError(
-            "\n".join([f"{source}: {len(faults)} fault{'s' * (len(faults) > 1)}", *(f"  {fault}" for fault in faults)])
-        )
+        raise UsageError(listed(source, faults))
     return found
 
 

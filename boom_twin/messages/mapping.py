@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from ..config.yaml_text import read_plain
-from ..errors import Fault, UsageError
+from ..errors import Fault, UsageError, listed
 from ..types import NO_LAG, SENSORS, Stream, sensor_kind, stream_of
 from .topic_table import (
     TYPES,
@@ -86,8 +86,7 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     if joints is not None:
         faults += _set_faults(names, joints, topics is not None and topics.is_shared)
     if faults or topics is None:
-        count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
-        raise UsageError("\n".join([f"{source}: {count}", *(f"  {fault}" for fault in faults)]))
+        raise UsageError(listed(source, faults))
     inputs = topics.inputs
     if topics.drive == "angles":
         inputs = {stream: topic for stream, topic in inputs.items() if stream is not Stream.STROKES}

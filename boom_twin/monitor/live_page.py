@@ -31,8 +31,7 @@ class SourceFeed(Feed):
 
     def __init__(self, twin: Twin, topics: Topics) -> None:
         most_waiting = 20_000  # largest number of waiting samples; beyond it the oldest are dropped
-        capacity = 150_000  # rows kept of every table: twelve minutes at 200 Hz
-        super().__init__("live", Store(capacity), topics, twin.scene)
+        super().__init__("live", Store(), topics, twin.scene)
         self._view = TwinView(self, topics, twin)
         self._waiting: deque[tuple[Sample, Report]] = deque(maxlen=most_waiting)
 

@@ -17,7 +17,7 @@ from ..monitor.data.feed import Feed
 from ..monitor.data.store import Store
 from ..scene.schema import Scene
 from ..types import SECOND, Stream
-from .bag.subscriptions import resolved_topics
+from .bag.subscriptions import resolved_topic
 from .runtime import message_class, qos_profile
 
 NAME = "boom_twin_monitor"
@@ -34,11 +34,10 @@ class TopicFeed(Feed):
     """
 
     def __init__(self, topics: Topics, scene: Scene | None = None) -> None:
-        capacity = 150_000  # rows kept of every table: twelve minutes at 200 Hz
         depth = 1000  # messages that may wait for the next look, for every topic: seconds of a session
         self._node = rclpy.create_node(NAME)
-        topics = resolved_topics(topics, self._node)
-        super().__init__("live", Store(capacity), topics, scene, boom=self._node.get_namespace())
+        topics = topics.renamed(lambda topic: resolved_topic(topic, self._node).name)
+        super().__init__("live", Store(), topics, scene, boom=self._node.get_namespace())
         shown = [topics.inputs[Stream.IMU], *topics.outputs.values(), topics.events]
         self._heard: list[tuple[Subscription[Any], str]] = []
         for topic in shown:

@@ -100,7 +100,7 @@ def _replace(path: Path, data: bytes, sync: Callable[[int], None]) -> None:
             stream.write(data)
             stream.flush()
             with suppress(PermissionError):  # of a file system without permissions
-                os.fchmod(stream.fileno(), _mode(path))
+                os.fchmod(stream.fileno(), stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask)
             sync(stream.fileno())
         draft.replace(path)
     except BaseException:
@@ -108,7 +108,3 @@ def _replace(path: Path, data: bytes, sync: Callable[[int], None]) -> None:
             draft.unlink()
         raise
     sync_folder(path.parent, sync)
-
-
-def _mode(path: Path) -> int:
-    return stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask

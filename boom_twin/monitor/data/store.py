@@ -71,9 +71,12 @@ EVERY_STROKE, GAP = "displacement", 0.1
 
 
 class Store:
-    """Data of a feed: tables of at most `capacity` rows, states of the lamps (all, for a recording), alarms."""
+    """Data of a feed: tables of at most `capacity` rows, states of the lamps (all, for a recording), alarms.
 
-    def __init__(self, capacity: int, keeps_statuses: bool = False) -> None:
+    By default a table keeps twelve minutes at 200 Hz.
+    """
+
+    def __init__(self, capacity: int = 150_000, keeps_statuses: bool = False) -> None:
         self._capacity, self._keeps_statuses = capacity, keeps_statuses
         self.driven_by = Stream.STROKES  # stream whose samples the model follows
         self.generation = 0  # incremented when a clock set back deletes all rows

@@ -131,11 +131,6 @@ def resolved_topic(topic: Topic, node: Any) -> Topic:
     return topic.model_copy(update={"name": node.resolve_topic_name(topic.name.replace("~", NODE, 1))})
 
 
-def resolved_topics(topics: Topics, node: Any) -> Topics:
-    """Return all topics of a mapping by their names in the namespace of `node`, with the node's remappings."""
-    return topics.renamed(lambda topic: resolved_topic(topic, node).name)
-
-
 def resolved_mapping(text: str, topics: Topics, node: Any) -> str:
     """Return the mapping `text` with all names of `topics` resolved by `resolved_topic`."""
     places: dict[tuple[str, ...], Topic] = {("inputs", stream.value): topic for stream, topic in topics.inputs.items()}
@@ -143,13 +138,8 @@ def resolved_mapping(text: str, topics: Topics, node: Any) -> str:
     for place, topic in places.items():
         name = resolved_topic(topic, node).absolute
         if name != topic.absolute:
-            text = with_mapped(text, (*place, "name"), name)
+            text = with_values(text, [((*place, "name"), name)])
     return text
-
-
-def with_mapped(text: str, place: tuple[str, ...], value: str) -> str:
-    """Return the text of a mapping with another value at one place."""
-    return with_values(text, [(place, value)])
 
 
 def subscription_of(node: Any, wanted: RequestedTopic) -> tuple[Any, QoSProfile, Recorded] | None:

@@ -79,7 +79,8 @@ def declare(node: Node) -> None:
 
 def _unknown(node: Node, names: Iterable[str]) -> str:
     """Return an error text on those of `names` that are no parameters; empty if all are."""
-    unknown = sorted(name for name in names if not _is_known(node, name))
+    # rclpy declares QoS overrides with their topics
+    unknown = sorted(name for name in names if not (node.has_parameter(name) or name.startswith("qos_overrides.")))
     return "; ".join(f"{name}: unknown. The nearest is `{nearest(name, [row.name for row in TABLE])}`" for name in unknown)
 
 
@@ -92,11 +93,6 @@ def refusal(node: Node, parameters: Iterable[Parameter[Any]]) -> str:
     integers = {name: each.value for name, each in given.items() if each.type_ == Parameter.Type.INTEGER}
     whole = [(name, value) for name, value in integers.items() if kinds.get(name) is float]
     return "; ".join(f"{name}: a number needs a decimal point: {value}.0, not {value}" for name, value in whole)
-
-
-def _is_known(node: Node, name: str) -> bool:
-    """Return True if the parameter was declared, here or by rclpy. QoS overrides are declared with their topics."""
-    return node.has_parameter(name) or name.startswith("qos_overrides.")
 
 
 def guard(node: Node, is_configured: Callable[[], bool], tune: Callable[[dict[str, float]], None]) -> None:
