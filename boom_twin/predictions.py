@@ -1,4 +1,4 @@
-"""Frozen values of the model at one stamp: prediction, its outline, and the estimate from all sensors."""
+"""Frozen values of the model at one stamp: prediction, its outline, the estimate from all sensors, clocks of streams."""
 
 from __future__ import annotations
 
@@ -19,6 +19,18 @@ class Outline:
     shape: Array
     undeflected: Array
     pins: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Clock of a stream against that of the strokes, as estimated."""
+
+    lag: float
+    lag_sigma: float
+    """By which its stamps are late, and the standard deviation, s."""
+    drift: float
+    drift_sigma: float
+    """Rate at which the lag grows, and the standard deviation; 1e-6 is 1 ppm."""
 
 
 @dataclass(frozen=True, slots=True)

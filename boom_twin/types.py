@@ -27,9 +27,6 @@ else:
 NANO = 1e-9  # s in a nanosecond: stamps are whole nanoseconds, spans of time are seconds
 SECOND = 1_000_000_000  # ns in a second
 
-HELD = frozenset({"leap", "late", "second source"})
-"""Events of samples that were left out, unless a later report gives them as `Report.earlier`."""
-
 Mount = Literal["root", "head", "root_compensated", "head_compensated"]
 """Place of an inclinometer on its section; the two places differ by the bending of the section.
 
@@ -162,7 +159,6 @@ SENSORS[Stream.PRESSURES] = SensorKind(
     gives=Stream.FORCES.value,
 )
 """In the order of `Stream`. Expected readings are in `boom_twin.deviation.channels`, topics in ``topics.yaml``."""
-NO_LAG = frozenset({Stream.FORCES, Stream.PRESSURES, Stream.MOMENTS})  # zeros that change with the posture hide a lag
 
 
 USUAL_STREAMS = tuple(stream for stream, kind in SENSORS.items() if not (kind.is_placed or kind.beside or kind.gives))
@@ -226,18 +222,6 @@ class Sample:
     of the cylinders, positive in tension. ``MOMENTS``: (n,) N m, positive where the outboard end is bent up. ``POINT``,
     ``POINT_2``: (2,) m, forward and up. NaN where the message had no value; a value beyond `LIMIT` counts as none.
     """
-
-
-@dataclass(frozen=True, slots=True)
-class Clock:
-    """Clock of a stream against that of the strokes, as estimated."""
-
-    lag: float
-    lag_sigma: float
-    """By which its stamps are late, and the standard deviation, s."""
-    drift: float
-    drift_sigma: float
-    """Rate at which the lag grows, and the standard deviation; 1e-6 is 1 ppm."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,7 +321,7 @@ class Report:
     stamp: int
     """Stamp of the sample, nanoseconds."""
     accepted: bool
-    """False if the sample was not used; `events` says why. A held one (`HELD`) serves time checks only, unless it is in the
+    """False if the sample was not used; `events` says why. A held one serves time checks only, unless it is in the
     `earlier` of a later report.
     """
     prediction: Prediction | None = None

@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import BagError
 from ..messages.sample_decoder import MOST_NAMES
 from ..messages.topic_table import Qos, Topic, Topics
-from ..types import SENSORS, Stream
+from ..types import SECOND, SENSORS, Stream
 from .inspect import BagInfo, Tally
 from .metadata import profiles
 from .reader import Session, TopicInfo, check_topic, read, readable
@@ -148,8 +148,6 @@ def _values(session: Session, name: str) -> list[Any]:
     return [channel.metadata.get("offered_qos_profiles", "") for channel in channels]
 
 
-NAMING_TIME = 5_000_000_000  # log time (ns) from the first message of strokes or angles, in which all names are read
-
 KINDS = {stream: kind.named for stream, kind in SENSORS.items() if kind.is_named and not kind.ends}
 
 
@@ -223,7 +221,7 @@ def _counted(number: int, kind: str) -> str:
 
 
 def _names_read(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[str, None]]:
-    """Return the names in messages of strokes and angles, read for `NAMING_TIME` and until all driving sensors are named."""
+    """Return the names in messages of strokes and angles, read for 5 s and until all driving sensors are named."""
     heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.heard.items()}
     present = {name: streams for name, streams in heard.items() if streams and (t := session.find(name)) and t.count}
     if not present:
@@ -237,6 +235,6 @@ def _names_read(session: Session, topics: Topics, joints: int) -> dict[Stream, d
         for stream in present[name]:
             if len(found[stream]) < MOST_NAMES:
                 found[stream].update(dict.fromkeys(message.name[:MOST_NAMES]))
-        if log - first > NAMING_TIME and needed <= found.get(drive, {}).keys():
+        if log - first > 5 * SECOND and needed <= found.get(drive, {}).keys():
             break
     return found

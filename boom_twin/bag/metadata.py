@@ -20,7 +20,6 @@ from ..messages.topic_table import Qos
 from ..system.atomic_files import write_atomic
 
 FILE_NAME = "metadata.yaml"
-VERSION = 9  # version of the format that Jazzy writes
 
 STORAGES = {".mcap": "mcap", ".db3": "sqlite3"}  # storages of rosbag2 that are read, by the suffix of their files
 _ROOT = "rosbag2_bagfile_information"
@@ -253,7 +252,7 @@ def metadata_of(
     filled = [file for file in files if file.count]
     first, last = min((file.first for file in filled), default=0), max((file.last for file in filled), default=0)
     return BagMetadata(
-        version=VERSION,
+        version=9,  # of the format that Jazzy writes
         storage_identifier="mcap",
         **_span(first, last),
         message_count=sum(file.count for file in files),

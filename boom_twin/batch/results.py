@@ -30,7 +30,6 @@ DAMAGE = "fatigue_damage_"  # prefix of the columns with the damage of a station
 DRIFTING = ("residual_mean_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
 """Prefixes of the figures whose drift is computed."""
 LEAST_SESSIONS = 4  # least number of sessions for a drift: a line with two residual degrees of freedom
-CHANCE = 1e-3  # largest p-value of a significant drift, as in `boom_twin.report.quantities.SIGNIFICANT`
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +152,8 @@ def drift_of(name: str, rows: Sequence[Row]) -> Drift | None:
     sigma = sqrt(max(1.0, scatter) / size)
     chance = 2.0 * float(student.sf(abs(slope) / sigma, freedom))
     span = float(np.ptp(days))
-    return Drift(name, len(days), span, mean + slope * float(away.min()), slope * span, sigma * span, chance < CHANCE)
+    significant = 1e-3  # largest p-value, as in `boom_twin.report.quantities.SIGNIFICANT`
+    return Drift(name, len(days), span, mean + slope * float(away.min()), slope * span, sigma * span, chance < significant)
 
 
 def _is_number(value: object) -> bool:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 
 ACTS = ("mark", "acknowledge")
-NICE = 5  # nice value of the monitor, by which it gives way to the node on the same machine
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -60,8 +59,8 @@ def run(args: Namespace) -> int:
 
 
 def _lower_priority() -> None:
-    """Lower this process's priority, so that the node runs first and is not interrupted in the midst of a step."""
-    os.nice(NICE)
+    """Lower this process's priority, so that the node on the same machine runs first and is not interrupted within a step."""
+    os.nice(5)
     if hasattr(os, "SCHED_BATCH"):  # Linux: does not preempt others when it wakes up
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 

@@ -20,11 +20,11 @@ from ..errors import SolverError, UsageError
 from ..kernels.jit import hold
 from ..kernels.result_row import places_in, prediction_width
 from ..kernels.tables import OK, SENTENCES, State, Tables, Work
-from ..predictions import Outline
+from ..predictions import Clock, Outline
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
-from ..types import NO_PLACES, SENSORS, Array, Clock, Mount, Place, Stream, StrokeReading, channels_of, streams_of
+from ..types import NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading, channels_of, streams_of
 from .channels import DRIFT_FIRST, LAG_FIRST, READS_MOMENT, TIP_IMU_STATES, measurement_of
 from .estimate_row import MODES
 from .kalman import FORCE_ZERO

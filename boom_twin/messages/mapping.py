@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError, listed
-from ..types import NO_LAG, SENSORS, Stream, sensor_kind, stream_of
+from ..types import SENSORS, Stream, sensor_kind, stream_of
 from .topic_table import (
     TYPES,
     InputTopic,
@@ -27,6 +27,8 @@ from .topic_table import (
     used_inputs,
     usual,
 )
+
+NO_LAG = frozenset({Stream.FORCES, Stream.PRESSURES, Stream.MOMENTS})  # zeros that change with the posture hide a lag
 
 _REMEDIES = {
     "name": "Give the name as it is published.",

@@ -26,7 +26,6 @@ from .type_store import fill_header, fill_xz, jazzy, new_message
 
 POINT = struct.Struct("<3d")
 LINE_STRIP, TEXT, ADD = 4, 9, 0
-LIFETIME = 1  # lifetime of a marker, s
 TRACE = 5_000_000_000  # duration of the tip's trace, ns
 TEXT_HEIGHT = 0.35  # height of the text, m
 
@@ -122,7 +121,7 @@ class ShapeMarkers:
         marker = new_message("visualization_msgs/msg/Marker")
         stamped(marker.header, self._frame)
         marker.ns, marker.id, marker.type, marker.action = namespace, number, kind, ADD
-        marker.pose.orientation.w, marker.lifetime.sec = 1.0, LIFETIME
+        marker.pose.orientation.w, marker.lifetime.sec = 1.0, 1
         marker.color.r, marker.color.g, marker.color.b, marker.color.a = colour
         return marker
 

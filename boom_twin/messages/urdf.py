@@ -18,9 +18,6 @@ from .topic_table import FRAME, TIP_JOINTS, load_topics
 NAME = "boom"
 TIP, TIP_RIGID, TIP_ALONG, TIP_ACROSS, IMU = "tip", "tip_rigid", "tip_along", "tip_across", "imu_link"
 UP_IS_POSITIVE = "0 -1 0"  # axis of every revolute joint (REP-103: x forward, z up): a positive angle raises what it turns
-EYE = 0.1  # length of the rod's eye outside the barrel over the length of the closed cylinder
-BARREL_RADIUS, ROD_RADIUS, BAR = 0.045, 0.025, 0.06
-"""Dimensions for drawing: radii over the length of the closed cylinder, side of a link's bar over the link's length."""
 COLOURS = {"section": "0.55 0.62 0.70 1", "link": "0.35 0.40 0.46 1", "barrel": "0.90 0.45 0.10 1", "rod": "0.80 0.82 0.85 1"}
 
 ABOUT = """
@@ -102,10 +99,10 @@ def _cylinder(robot: Element, scene: Scene, i: int) -> None:
 
 
 def _barrel_and_rod(robot: Element, barrel: str, rod: str, part: Cylinder) -> None:
-    eye = EYE * part.closed_length
-    round_bar = part.closed_length * BARREL_RADIUS, part.closed_length * ROD_RADIUS
-    _tube(SubElement(robot, "link", name=barrel), 0.0, part.closed_length - eye, round_bar[0], "barrel")
-    _tube(SubElement(robot, "link", name=rod), -part.max_stroke - eye, 0.0, round_bar[1], "rod")
+    closed = part.closed_length
+    eye = 0.1 * closed  # of the rod, outside the barrel
+    _tube(SubElement(robot, "link", name=barrel), 0.0, closed - eye, 0.045 * closed, "barrel")
+    _tube(SubElement(robot, "link", name=rod), -part.max_stroke - eye, 0.0, 0.025 * closed, "rod")
 
 
 def _links(robot: Element, scene: Scene, i: int) -> None:
@@ -114,10 +111,11 @@ def _links(robot: Element, scene: Scene, i: int) -> None:
     left, right = f"link_l_{i + 1}", f"link_r_{i + 1}"
     for name, length, carries in ((left, row.length_l, row.mount == LINK_L), (right, row.length_r, row.mount != LINK_L)):
         link = SubElement(robot, "link", name=name)
-        _bar(link, (0.0, 0.0), (length, 0.0), BAR * length, "link")
+        side = 0.06 * length
+        _bar(link, (0.0, 0.0), (length, 0.0), side, "link")
         if carries and row.left:
             for start in (0.0, length):
-                _bar(link, (start, 0.0), (row.along, row.left), BAR * length, "link")
+                _bar(link, (start, 0.0), (row.along, row.left), side, "link")
     _joint(robot, LEFT.format(i + 1), "continuous", _carrier(i), left, (pivot[0] + row.dx, pivot[1] + row.dy))
     _joint(robot, RIGHT.format(i + 1), "continuous", f"section_{i + 1}", right, (row.ex, row.ey))
 

@@ -23,7 +23,6 @@ PAGE = Path(__file__).parent / "page"
 MAX_VIEWERS = 16
 MAX_REQUEST_BYTES = 4096  # largest request of a page, bytes
 ALARM_PERIOD = 1.0  # seconds between two looks for changes of alarms
-HEARTBEAT = 60.0  # seconds without an answer after which the connection of a viewer is closed
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -69,9 +68,10 @@ class Server:
         return web.Response(body=body, headers={"Content-Type": kind})
 
     async def _connect(self, request: web.Request) -> web.StreamResponse:
+        heartbeat = 60.0  # seconds without an answer after which the connection is closed
         if len(self._viewers) >= MAX_VIEWERS:
             raise web.HTTPServiceUnavailable(text=f"{MAX_VIEWERS} pages are open already; close one")
-        socket = web.WebSocketResponse(heartbeat=HEARTBEAT, max_msg_size=MAX_REQUEST_BYTES, compress=False)
+        socket = web.WebSocketResponse(heartbeat=heartbeat, max_msg_size=MAX_REQUEST_BYTES, compress=False)
         self._viewers.add(socket)
         try:
             await socket.prepare(request)
@@ -125,9 +125,6 @@ def _stop_on_fault(task: asyncio.Task[None]) -> None:
         raise web.GracefulExit
 
 
-BACKLOG = 128  # connections that may wait to be accepted; the kernel refuses more
-
-
 @asynccontextmanager
 async def serving(server: Server, access: AccessControl, host: str, port: int | None) -> AsyncIterator[str]:
     """Serve pages within the context; provide their address.
@@ -147,7 +144,8 @@ async def serving(server: Server, access: AccessControl, host: str, port: int | 
 
 
 async def _listen(connections: Connections, host: str, port: int | None) -> asyncio.Server:
-    listen = partial(asyncio.get_running_loop().create_server, connections, host, backlog=BACKLOG)
+    backlog = 128  # connections that may wait to be accepted; the kernel refuses more
+    listen = partial(asyncio.get_running_loop().create_server, connections, host, backlog=backlog)
     try:
         return await listen(PORT if port is None else port)
     except OSError as error:

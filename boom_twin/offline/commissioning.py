@@ -16,13 +16,13 @@ from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import SessionScene, kept, mapping_of, scene_of, settings_of, strokes_of
 from ..config.yaml_text import plain, read_plain
 from ..errors import BagError, UsageError
-from ..messages.mapping import mapping_from
+from ..messages.mapping import NO_LAG, mapping_from
 from ..messages.topic_table import Sensor, Topics, usual
 from ..scene.edit import loaded
 from ..scene.load import SceneSource
 from ..twin.blocks import CODES, SampleBlock
 from ..twin.twin import Twin
-from ..types import NO_LAG, SENSORS, Array, Place, Stream, StrokeReading
+from ..types import SENSORS, Array, Place, Stream, StrokeReading
 from ..wiring.check import STROKES_ALONE, Checked, Verdict, check, finding
 from ..wiring.readings import Channel, Lag, RestModel, Series, Window, is_checked, lag_of
 from .session_samples import SessionSamples

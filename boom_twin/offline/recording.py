@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from ..analysis.sample_series import ColumnStatistics
 from ..deviation.load_spectrum import TipLoad, TipLoadFinder
 from ..health.alarms import Alarms, evidence_with_cause
+from ..predictions import Clock
 from ..system.received_files import sha256_of
 from ..twin.blocks import CODES, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined
-from ..types import HELD, NANO, USUAL_STREAMS, Alarm, Array, Clock, Health, Stream, StrokeReading, channels_of
+from ..types import NANO, USUAL_STREAMS, Alarm, Array, Health, Stream, StrokeReading, channels_of
 from .ground_truth import TipErrors
 
 STRETCH = 2**14  # predictions in a stretch, at least: 82 s at 200 Hz, some 30 MB
@@ -151,8 +152,9 @@ class Recording:
         """Add a block of samples and their reports."""
         self._samples.append(samples)
         self._parts.append(rows)
+        held = {"leap", "late", "second source"}  # such samples were left out, unless a later report gives them
         for row, note in rows.notes.items():
-            is_refused = not note.accepted or not HELD.isdisjoint(note.events)
+            is_refused = not note.accepted or not held.isdisjoint(note.events)
             self.refused += is_refused - note.was_held
             self._note_time(rows.predictions, row, frozenset(note.events))
         stamps = rows.predictions.stamps

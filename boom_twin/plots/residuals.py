@@ -117,7 +117,6 @@ def density(stamps: Array, values: Array, interval: float = 0.0) -> Density:
 
 
 SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
-MEAN_OVER = 1.0  # s of the running mean
 
 
 def residual_picture(path: Path, session: str, history: History, note: str) -> None:
@@ -159,7 +158,7 @@ def _channel(axes: Axes, history: History, channel: int, reach: float) -> None:
     axes.set_xlim(extent(stamps))
 
 
-def running_mean(stamps: Array, values: Array, over: float = MEAN_OVER) -> Array:
+def running_mean(stamps: Array, values: Array, over: float = 1.0) -> Array:
     """Return the mean of all samples within half of `over` (s) of each one, shape (k, ..); `stamps` (k,) ascending, no NaN."""
     total = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
     first = np.searchsorted(stamps, stamps - 0.5 * over)

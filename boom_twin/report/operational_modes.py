@@ -1,7 +1,7 @@
 """Natural frequencies, damping ratios and mode shapes of a session's rest periods, under any excitation.
 
 Stochastic subspace identification with covariances (B. Peeters and G. De Roeck, Mech. Syst. Signal Process. 13 (1999),
-855-878), by pyOMA-2. Poles are computed for model orders up to `HIGHEST_ORDER`. A pole that stays the same from one order to
+855-878), by pyOMA-2. Poles are computed for model orders up to 40. A pole that stays the same from one order to
 the next is stable. Stable poles of one frequency are a mode. Deviations follow from the covariance of the output covariances.
 """
 
@@ -23,8 +23,6 @@ from ..types import Array
 
 RATE = 40.0  # Hz, rate of the averaged samples
 SHORTEST_REST = 20.0  # s
-BLOCK_ROWS, HIGHEST_ORDER, RECORD_PARTS = 25, 40, 10
-NEAR = 0.2  # largest relative distance of a measured mode from its mode of the model
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +106,10 @@ def _identified(values: Array, leading: int, with_deviations: bool) -> tuple[Arr
     except ImportError:
         raise UsageError("pyOMA-2 is not installed. Install it: pip install 'boom_twin[modal]'.") from None
     limits: Any = {"xi_max": largest_damping, "mpc_lim": None, "mpd_lim": None, "CoV_max": largest_variation}
+    block_rows, highest_order, record_parts = 25, 40, 10
     method: Any = SSI(
-        name="ssi", br=BLOCK_ROWS, ordmax=HIGHEST_ORDER, ref_ind=list(range(leading)), hc=limits,
-        calc_unc=with_deviations, nb=RECORD_PARTS,
+        name="ssi", br=block_rows, ordmax=highest_order, ref_ind=list(range(leading)), hc=limits,
+        calc_unc=with_deviations, nb=record_parts,
     )  # fmt: skip
     silenced, setup = logging.root.manager.disable, SingleSetup(values, fs=RATE)
     logging.disable(logging.INFO)
@@ -152,7 +151,8 @@ def _shapes(values: Array, leading: int, frequencies: list[float]) -> list[Array
 def _mode(group: Array, shape: Array, model: Array) -> OperationalMode:
     line_damping = 0.002  # damping ratio below which it is a pump's line
     frequency, damping, frequency_sigma, damping_sigma = np.median(group, axis=0).tolist()
-    near = [float(each) for each in model if abs(each - frequency) <= NEAR * each]
+    distance = 0.2  # largest relative distance of a measured mode from its mode of the model
+    near = [float(each) for each in model if abs(each - frequency) <= distance * each]
     nearest = min(near, key=lambda each: abs(each - frequency), default=None)
     return OperationalMode(
         frequency, frequency_sigma, damping, damping_sigma, len(group), damping < line_damping, shape, nearest

@@ -28,7 +28,6 @@ from .vibration import MODE_DISTANCE, SHORTEST_REST
 
 FILE_NAME = "report.html"
 HOUR = 3600.0  # s
-WORST = 3  # stations named in the first lines
 AGAINST_TRUTH = (
     ("tip_error_rms_m", "predicted tip against the truth, m rms"),
     ("tip_estimate_error_rms_m", "estimated tip against the truth, m rms"),
@@ -53,7 +52,7 @@ def write_report(found: Evaluation, folder: Path) -> Path:
         scene=f"{summary['scene']}: {len(found.scene.sections)} sections. {found.scene.description}".strip(),
         alarms=[_alarm(alarm) for alarm in alarms] if recording.is_judged else None,
         stops=any(map(_stops, alarms)),
-        worst=[f"{load.station.name}: {_stress(load)} MPa at {load.time:.1f} s" for load in found.loads[:WORST]],
+        worst=[f"{load.station.name}: {_stress(load)} MPa at {load.time:.1f} s" for load in found.loads[:3]],
         life=_life(found),
         facts=_facts(found),
         joints=_joints(summary),

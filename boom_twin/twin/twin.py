@@ -9,8 +9,9 @@ import numpy as np
 
 from ..errors import UsageError
 from ..health.monitor import warm_up
+from ..predictions import Clock
 from ..scene.kinematics import strokes_of_angles
-from ..types import SECOND, Array, Change, Clock, Health, Report, Sample, Stream, StrokeReading
+from ..types import SECOND, Array, Change, Health, Report, Sample, Stream, StrokeReading
 from .blocks import CODES, REGULAR, STREAMS, ReportBlock, SampleBlock, block_of, joined
 from .sample_check import check_units, merged, samples_of
 from .sample_taker import SampleTaker

@@ -86,7 +86,6 @@ def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
 
 
 SPECTRUM_SPAN = 40.0  # time span of the spectrum, up to the shown time, s
-PROMINENCE = 6.0  # lowest prominence of a peak, dB
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +125,7 @@ def _peaks(frequencies: Array, density: Array, rate: float) -> list[Peak]:
     max_peaks = 5
     lowest_peak, highest_peak = 0.3, 30.0  # frequencies of peaks, Hz
     level = 10.0 * np.log10(np.maximum(density, 1e-30))
-    found, _ = find_peaks(level, prominence=PROMINENCE)
+    found, _ = find_peaks(level, prominence=6.0)  # dB
     found = [i for i in found if lowest_peak <= frequencies[i] <= min(highest_peak, 0.4 * rate)]
     peaks = []
     for i in sorted(found, key=lambda place: -level[place])[:max_peaks]:

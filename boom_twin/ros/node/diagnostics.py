@@ -22,10 +22,10 @@ from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import ODDITIES, SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
+from ...predictions import Clock as StreamClock
 from ...twin.blocks import EVENTS, TOLD_AT_ONCE
 from ...twin.twin import Twin
 from ...types import NANO, Stream
-from ...types import Clock as StreamClock
 from ..receive import LARGEST, ReceiveQueue
 from ..runtime import DiagnosticsPublisher, Log, node_name, qos_profile
 

@@ -273,7 +273,6 @@ def intervals(degrees: Array, mask: Mask) -> str:
 # -- pins in the way of a cylinder ----------------------------------------------------------------------------------------
 
 PIN = 0.5  # diameter of a pin over the bore
-BARREL = 0.9  # of the closed length; the rest is the rod's end and its eye
 
 
 def distances_to(point: Array, start: Array, end: Array) -> tuple[Array, Array]:
@@ -326,9 +325,10 @@ def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) ->
     pins = joint_pins(scene, i, phi)
     foot, rod_pin = pins.pop("C" if i else "cylinder_pin"), pins.pop(rod_pin_of(pins))
     length = np.abs(rod_pin - foot)
+    barrel = 0.9 * cylinder.closed_length  # the rest is the rod's end and its eye
     for name, pin in (pins | _pins_before(scene, i, pins["the pivot"])).items():
         distance, place = distances_to(pin, foot, rod_pin)
-        at_barrel = place * length < BARREL * cylinder.closed_length
+        at_barrel = place * length < barrel
         radius = np.where(at_barrel, (0.5 + wall) * oil.bore, 0.5 * oil.rod)
         yield Pass(name, distance, radius + 0.5 * PIN * oil.bore, at_barrel)
 

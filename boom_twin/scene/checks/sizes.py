@@ -129,8 +129,6 @@ def _gravity(draft: Draft) -> Findings:
 
 # -- parts against each other -----------------------------------------------------------------------------------------
 
-WALL = 20.7  # the wall of a thin box is A^2/(I WALL) of its depth, DEPTH_BY_GYRATION radii of gyration
-SLACK = 1e-3  # of a value that was rounded
 STEEL, STEEL_E = 7850.0, (1.9e11, 2.2e11)
 SPECIFIC_STIFFNESS = (8e6, 1.2e8)  # E / rho, m^2/s^2: glass fibre 1e7, metals 2.6e7, carbon fibre 9e7
 
@@ -237,14 +235,16 @@ def material(draft: Draft) -> Findings:
 def beams(draft: Draft) -> Findings:
     """Check all sections that have a beam."""
     scene = draft.scene
+    box = 20.7  # the wall of a thin box is A^2/(I box) of its depth, DEPTH_BY_GYRATION radii of gyration
+    rounded = 1.0 + 1e-3  # slack of a value that was rounded
     rho, before = density(scene), None
     for i, section in enumerate(scene.sections):
         if section.beam is not None and section.A is not None and section.I is not None:
             radius = math.sqrt(section.I / section.A)
-            thin_wall = 1e3 * DEPTH_BY_GYRATION * radius / WALL
+            thin_wall = 1e3 * DEPTH_BY_GYRATION * radius / box
             own = section.model_dump(include={"length", "height", "A", "I", "rho_A", "rho_I"})
             own |= {"radius": radius, "depth": DEPTH_BY_GYRATION * radius, "thin_wall": thin_wall, "before": before}
-            own |= {"wall": thin_wall * section.A**2 / section.I, "slack": (section.rho_A or 0.0) * (1.0 + SLACK)}
+            own |= {"wall": thin_wall * section.A**2 / section.I, "slack": (section.rho_A or 0.0) * rounded}
             own |= {} if rho is None else {"steel": rho * section.A, "rotary": rho * section.I}
             yield from _judged(draft, BEAM, ("sections", i), **own)
             yield from _ends(draft, i, section.length, section.beam)
