@@ -13,9 +13,9 @@ from command import main
 from default_boom import strokes_of_posture, with_parameters
 
 from boom_twin import Twin, load_scene, simulate, statics
-from boom_twin.offline.history import HistoryBuilder
+from boom_twin.offline.history import HistoryBuilder, course
 from boom_twin.offline.recording import Recording
-from boom_twin.report.vibration import SHORTEST_REST, RestFinder, course, still, vibrations
+from boom_twin.report.vibration import SHORTEST_REST, RestFinder, still, vibrations
 from boom_twin.twin.blocks import CODES, SampleBlock
 from boom_twin.types import SECOND, Array, StrokeReading
 
@@ -83,7 +83,7 @@ def test_a_boom_on_locked_drives_rests_with_the_frequencies_of_its_drives(swung,
     expected = statics(scene, swung.strokes[-1]).frequencies
     assert rest.model == pytest.approx(expected, rel=5e-4)
     resting = replace(own, stamps_s=own.stamps_s[400:], strokes=own.strokes[400:])
-    assert course(resting, scene)[1] == pytest.approx(np.tile(expected, (60, 1)), rel=1e-3)
+    assert course(resting, scene, 60)[1] == pytest.approx(np.tile(expected, (60, 1)), rel=1e-3)
     assert statics(scene, statics(scene, swung.strokes[-1]).lengths).frequencies != pytest.approx(expected, rel=3e-3)
 
 
