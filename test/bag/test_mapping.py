@@ -70,17 +70,14 @@ def test_what_is_left_out_is_as_usual(write: Any) -> None:
         ("inputs: {tip_imu: {delay: 20.0}}", "inputs.tip_imu.delay = 20.0: it must be less than or equal to 10."),
         ("inputs: {tip_imu: {dely: 0.1}}", "inputs.tip_imu.dely = 0.1: unknown key. The nearest known key here is `delay`."),
         ("inputs: {cylinder_strokes: {delay: 0.1}}", "inputs.cylinder_strokes.delay = 0.1: every output has the stamp of a"),
-        ("outputs: {shape: {delay: 0.1}}", "outputs.shape.delay = 0.1: unknown key."),
         ("frame: /base_link", "frame = '/base_link'"),
         ("inputs: {tip_gyro: {}}", "inputs.tip_gyro = {}: unknown topic. The nearest is `tip_imu`."),
-        ("inputs: {tip_imu: {requird: false}}", "inputs.tip_imu.requird = false: unknown key. The nearest known key here is"),
         ("sensor: {}", "sensor = {}: unknown key. The nearest known key here is `sensors`."),
         (EXAMPLE.replace("qos: {reliability: reliable}", "qos: {}", 1), "inputs.joint_angles.qos = {'reliability'"),
         ("sensors: {joint_1: {sign: 0}}", "sensors.joint_1.sign = 0: it must be 1 or -1. Give 1, or -1 for a sensor"),
         ("sensors: {joint_1: {scale: 0.0}}", "sensors.joint_1.scale = 0.0: it must be greater than 0."),
         ("sensors: {joint_1: {zero: .nan}}", "sensors.joint_1.zero = nan: it must be a finite number."),
         ("sensors: {joint_1: {unit: mm}}", "sensors.joint_1.unit = 'mm': it must be one of rad, mrad, deg, gon."),
-        ("sensors: {joint_1: {unit: [mm]}}", "sensors.joint_1.unit = ['mm']"),
         ("sensors: {joint_1: {absolut: root}}", "sensors.joint_1.absolut = 'root': unknown key. The nearest known key here"),
         ("sensors: {joint_1: {absolute: tip}}", "sensors.joint_1.absolute = 'tip': it must be 'root', 'head', 'root_comp"),
         ("sensors: {cylinder_1: {absolute: root}}", "only an angle (joint_i) can be absolute"),
@@ -160,16 +157,12 @@ RIG = f"origin: {RIG_ORIGIN}\n"
     ("sheet", "reading"),
     [
         (None, "length"),
-        ("note: no more\n", "length"),
-        ("boom_twin: 0.1.0\n", "length"),
         ("boom_twin: 0.1.0\norigin: a rig in Graz\n", "length"),
         (f"boom_twin: 0.1.0\n{RIG}", "drive"),
-        (f"boom_twin: 0.1\n{RIG}", "drive"),
         (f"boom_twin: 0.1.7.dev3\n{RIG}", "drive"),
         (f"boom_twin: 0.1.0\n{RIG}strokes: length\n", "length"),
         (f"boom_twin: 0.2.0\n{RIG}", "length"),
         (f"boom_twin: 0.10.0\n{RIG}", "length"),
-        (f"boom_twin: 1.0.0\n{RIG}", "length"),
         (f"boom_twin: newest\n{RIG}", "length"),
         ("strokes: drive\n", "drive"),
     ],
@@ -186,7 +179,7 @@ def test_a_session_says_what_its_transducers_read(tmp_path: Path, write: Any, sh
     assert strokes_of(None, mapping_of(tmp_path)).reading is StrokeReading.LENGTH
 
 
-@pytest.mark.parametrize("mapping", ["sensors: {joint_1: {sign: 2}}", "sensors: [", "a: b: c"])
+@pytest.mark.parametrize("mapping", ["sensors: {joint_1: {sign: 2}}", "sensors: ["])
 def test_a_recorded_mapping_that_cannot_be_used_is_told(tmp_path: Path, mapping: str) -> None:
     bag = recorded(tmp_path / "bag", mapping)
     with pytest.raises((BagError, UsageError), match=FILE_NAME):

@@ -130,9 +130,7 @@ def test_the_given_scene_comes_first_then_the_sessions_then_the_default(four, fi
     [
         (FAULTY, "session.yaml, scene: "),
         ("a: &a [1]\nb: " + "[*a]" * 3, "not valid YAML"),
-        ("/etc/passwd", "session.yaml, scene: "),
         ("sections: !!python/object/apply:os.system ['true']", "session.yaml, scene: "),
-        ("a: &a " + "[" * 40 + "1" + "]" * 40, "session.yaml, scene: "),
     ],
 )
 def test_a_broken_scene_in_a_session_is_one_line_with_the_remedy(text, words, tmp_path, capsys):
