@@ -11,6 +11,7 @@ from ..errors import UsageError
 from ..health.monitor import warm_up
 from ..scene.kinematics import strokes_of_angles
 from ..types import SECOND, Array, Change, Clock, Health, Report, Sample, Stream, StrokeReading
+from .adjustments import WHOLE
 from .blocks import CODES, REGULAR, STREAMS, ReportBlock, SampleBlock, block_of, joined
 from .sample_check import check_units, merged, samples_of
 from .sample_taker import SampleTaker
@@ -113,8 +114,11 @@ class Twin(SampleTaker):
         Raises
         ------
         UsageError
-            Too few residuals within the last second.
+            Too few residuals within the last second, or no such sensor.
         """
+        channels = {name for names in self._channels.values() for name in names}
+        if not channels.issuperset(WHOLE.get(sensor, (sensor,))):
+            raise UsageError(f"{sensor!r}: no sensor of this boom. Give tip_imu, or one of {', '.join(sorted(channels))}.")
         kind, _, number = sensor.rpartition("_")
         if self.reads is StrokeReading.ANGLE and kind in ("cylinder", "joint"):
             told = f"{sensor}: angles drive the model, and nothing else measures them"
