@@ -60,6 +60,8 @@ class Changes:
     def _begins(self, logged: int, change: Change, log: int, stamp: int) -> bool:
         if abs(log - logged) > CHANGE_SPAN:
             return log > logged
+        if self._before < 0:
+            return change.stamp <= stamp  # an earlier one is latched: it was made before the recording began
         return stamp == change.stamp or self._before < change.stamp < stamp < change.stamp + CHANGE_SPAN
 
 
