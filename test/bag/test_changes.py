@@ -64,7 +64,16 @@ LOOP = [*ROUND, *((log + 10.0, stamp) for log, stamp in ROUND)]
         ([(23.0, 3.0)], LOOP, [(3.0, 23.0)]),
         ([(20.0, 0.0)], LOOP, [(0.0, 20.0)]),
     ],
-    ids=["plain", "its stroke is lost", "recorded from later on", "latched", "latched, late", "in a pause of the recording", "second round", "jump back"],
+    ids=[
+        "plain",
+        "its stroke is lost",
+        "recorded from later on",
+        "latched",
+        "latched, late",
+        "in a pause of the recording",
+        "second round",
+        "jump back",
+    ],
 )
 def test_where_a_change_begins(logged: list, strokes: list, expected: list) -> None:
     assert begun(logged, strokes) == expected

@@ -169,7 +169,7 @@ def test_a_session_writer_refuses_what_no_replay_would_read(rows: Rows, tmp_path
     with SessionWriter(tmp_path / "s") as session:
         session.write(Sample(Stream.STROKES, np.int64(10**9), lengths))  # type: ignore[arg-type]
         for stamp, values in ((0, lengths), (2**61, lengths), (1.5, lengths), (2 * 10**9, lengths[:2])):
-            with pytest.raises(UsageError, match="[Gg]ive"):
+            with pytest.raises(UsageError, match=r"[Gg]ive"):
                 session.write(Sample(Stream.STROKES, stamp, values))
     assert scan(tmp_path / "s").find("cylinder_strokes").count == 1
     with pytest.raises(UsageError, match="the session is closed"):
