@@ -66,7 +66,7 @@ def stored_files(path: Path, storage: str = "") -> list[Path]:
         return [path.resolve() if path.is_symlink() else path]  # the user's own word, unlike a link in a folder
     refuse_absent(path)
     kinds = {suffix for suffix, kind in STORAGES.items() if kind.startswith(storage)}
-    files = sorted(file for file in path.iterdir() if file.suffix in kinds)
+    files = sorted((file for file in path.iterdir() if file.suffix in kinds), key=_by_number)
     if not files:
         for file in sorted(path.iterdir()):
             refuse_packed(file)

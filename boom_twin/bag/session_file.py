@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from abc import ABC, abstractmethod
 from collections import Counter
@@ -9,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from numbers import Real
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -18,7 +20,7 @@ from mcap.records import Channel, Schema
 from rosbags.serde import SerdeError
 from zstandard import ZstdError
 
-from ..errors import BagError
+from ..errors import BagError, UsageError
 from ..messages.cdr_decoder import MessageBlock, by_log_time, joined
 from ..messages.type_store import decode, jazzy
 from ..types import NANO
@@ -38,6 +40,11 @@ class TimeWindow:
 
     start: float = 0.0
     duration: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in (("start", self.start), ("duration", 0.0 if self.duration is None else self.duration)):
+            if not isinstance(value, Real) or not 0.0 <= value < math.inf:
+                raise UsageError(f"{name} = {value!r}: must be a number of seconds, at least 0.")
 
     def share(self, length: float) -> float:
         """Return the share of a session of `length` (s) that lies in the window, 0 to 1."""

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..errors import BagError, UsageError
 from ..messages.mapping import load_mapping
-from ..messages.sample_decoder import NO_MEASUREMENT
+from ..messages.sample_decoder import LATEST, NO_MEASUREMENT
 from ..messages.topic_table import FRAME, Topics, every_input, factor
 from ..messages.type_store import fill_header, jazzy, new_message
 from ..scene.load import SceneSource
-from ..twin.sample_check import samples_of
+from ..twin.sample_check import SampleCheck, samples_of
 from ..types import SECOND, SENSORS, Array, Sample, Stream
 from .async_writer import FileSplit, Storage
 from .session_model import SessionSheet, scene_from
@@ -178,7 +178,9 @@ class SessionWriter:
         self._keys: dict[str, int] = {}
         self._sensors = {stream: _Sensors(self._topics, stream, self._joints) for stream in Stream}
         self._counts: Counter[str] = Counter()
-        self._log, self._due = LogTimes(), 0.0
+        self._log, self._due, self._is_closed = LogTimes(), 0.0, False
+        channels = {stream: SENSORS[stream].channels(self._joints) for stream in Stream}
+        self._check = SampleCheck(channels, Stream.ANGLES if self._topics.drive == "angles" else Stream.STROKES)
 
     def write(self, sample: Sample | Mapping[str, Any], stamp_ns: int | None = None) -> None:
         """Append a sample, or readings by name in SI units as for `Twin.update`.
@@ -188,11 +190,15 @@ class SessionWriter:
         BagError
             The disk is full or fails, or does not keep up.
         UsageError
-            Readings by name cannot be used, see `boom_twin.twin.sample_check.samples_of`.
+            A sample, or readings by name, that `Twin.update` refuses; a stamp before 1970 or at 0; the context has ended.
         """
         check_period = 0.5  # time (s) between two checks of the disk
+        if self._is_closed:
+            raise UsageError(f"{self._out}: the session is closed. Write within its `with` block.")
         samples = samples_of(sample, stamp_ns, self._joints) if isinstance(sample, Mapping) else [sample]
-        for each in samples:
+        for each in map(self._check.checked, samples):
+            if not 0 < each.stamp < LATEST:
+                raise UsageError(f"stamp is {each.stamp} ns: a message can hold 1 to {LATEST - 1}. Give ns since 1970.")
             topic = self._topics.inputs.get(Stream(SENSORS[each.stream].beside or each.stream))
             if topic is None:
                 raise UsageError(f"{each.stream.value}: the mapping has no such sensor. Give its place there.")
@@ -210,7 +216,7 @@ class SessionWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        written = self._storage.close()
+        written, self._is_closed = self._storage.close(), True
         if kind is None:
             counts = {topic: written[key] for topic, key in self._keys.items()}
             if counts != dict(self._counts):

@@ -55,6 +55,8 @@ class Changes:
         change_span = 2_000_000_000  # ns, of log time and of stamps; a looped session repeats stamps
         if abs(log - logged) > change_span:
             return log > logged
+        if self._before < 0:
+            return change.stamp <= stamp  # an earlier one is latched: it was made before the recording began
         return stamp == change.stamp or self._before < change.stamp < stamp < change.stamp + change_span
 
 

@@ -32,6 +32,10 @@ class SampleCheck:
 
     def checked(self, sample: Sample) -> Sample:
         """Return the sample with an int stamp and contiguous float64 values (channels,); UsageError as of `Twin.update`."""
+        if not isinstance(sample, Sample):
+            raise UsageError(
+                f"sample is {repr_of(sample)}. Give Sample(Stream.STROKES, stamp_ns, values), or readings by name."
+            )
         stream, stamp, values = sample.stream, sample.stamp, sample.values
         if (
             type(stamp) is int

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
-from ..errors import BoomTwinError, SolverError
+from ..errors import BoomTwinError, SolverError, UsageError
 from ..health.causes import Hypothesis
 from ..health.fault_twins import FaultTwins, Follower
 from ..health.monitor import HealthMonitor
@@ -65,6 +65,8 @@ class SampleTaker:
         room: Room = ROOM,
     ) -> None:
         self.reads, self._drive, self.absent, scene = reads, reads.stream, frozenset(absent), as_scene(scene)
+        if not isinstance(settings, Settings | None):
+            raise UsageError(f"settings = {settings!r}: give Settings(name=value, ..), load_settings(FILE), or None.")
         self.scene, self.settings, self._health = scene, settings or Settings(), health
         self.counts: Counter[str] = Counter()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)

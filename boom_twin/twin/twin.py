@@ -12,6 +12,7 @@ from ..health.monitor import warm_up
 from ..predictions import Clock
 from ..scene.kinematics import strokes_of_angles
 from ..types import SECOND, Array, Change, Health, Report, Sample, Stream, StrokeReading
+from .adjustments import WHOLE
 from .blocks import CODES, REGULAR, STREAMS, ReportBlock, SampleBlock, block_of, joined
 from .sample_check import check_units, merged, samples_of
 from .sample_taker import SampleTaker
@@ -114,8 +115,11 @@ class Twin(SampleTaker):
         Raises
         ------
         UsageError
-            Too few residuals within the last second.
+            Too few residuals within the last second, or no such sensor.
         """
+        channels = {name for names in self._channels.values() for name in names}
+        if not channels.issuperset(WHOLE.get(sensor, (sensor,))):
+            raise UsageError(f"{sensor!r}: no sensor of this boom. Give tip_imu, or one of {', '.join(sorted(channels))}.")
         kind, _, number = sensor.rpartition("_")
         if self.reads is StrokeReading.ANGLE and kind in ("cylinder", "joint"):
             told = f"{sensor}: angles drive the model, and nothing else measures them"

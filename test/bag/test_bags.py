@@ -134,6 +134,13 @@ def test_bare_file_and_directory_without_metadata(bag: Path, content: Content) -
     assert session.notes == {"origin": "synthetic, made for a test"}
 
 
+def test_files_without_metadata_are_in_the_order_of_their_numbers(bag: Path, tmp_path: Path) -> None:
+    (tmp_path / "split").mkdir()
+    for number in (10, 9, 2):
+        (tmp_path / "split" / f"s_{number}.mcap").write_bytes((bag / FILE_NAME).read_bytes())
+    assert [file.path.name for file in scan(tmp_path / "split").files] == ["s_2.mcap", "s_9.mcap", "s_10.mcap"]
+
+
 def test_split_files_are_merged_by_time(tmp_path: Path, arrays: dict[str, Any], bag: Path, content: Content) -> None:
     cuts = {"late": slice(25, None), "early": slice(None, 25)}
     (tmp_path / "split").mkdir()

@@ -58,11 +58,22 @@ LOOP = [*ROUND, *((log + 10.0, stamp) for log, stamp in ROUND)]
         ([(10.01, 0.0), (13.0, 3.0)], ROUND, [(0.0, 10.0), (3.0, 13.0)]),
         ([(10.0, 0.25)], ROUND, [(0.25, 10.3)]),
         ([(10.3, 0.0)], ROUND[2:], [(0.0, 10.2)]),
+        ([(9.9, -90.0)], ROUND, [(-90.0, 10.0)]),
+        ([(10.3, -90.0)], ROUND, [(-90.0, 10.0)]),
         ([(13.02, 3.0)], [*ROUND[:20], *LOOP[100:]], [(3.0, 20.0)]),
         ([(23.0, 3.0)], LOOP, [(3.0, 23.0)]),
         ([(20.0, 0.0)], LOOP, [(0.0, 20.0)]),
     ],
-    ids=["plain", "its stroke is lost", "recorded from later on", "in a pause of the recording", "second round", "jump back"],
+    ids=[
+        "plain",
+        "its stroke is lost",
+        "recorded from later on",
+        "latched",
+        "latched, late",
+        "in a pause of the recording",
+        "second round",
+        "jump back",
+    ],
 )
 def test_where_a_change_begins(logged: list, strokes: list, expected: list) -> None:
     assert begun(logged, strokes) == expected

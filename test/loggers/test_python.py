@@ -12,7 +12,19 @@ from command import main
 from loggers.logger_files import readings
 from recordings import scan
 
-from boom_twin import BagError, BoomTwinError, Sample, SessionWriter, Stream, Twin, UsageError, load_scene, replay, statics
+from boom_twin import (
+    BagError,
+    BoomTwinError,
+    Sample,
+    SessionWriter,
+    Stream,
+    TimeWindow,
+    Twin,
+    UsageError,
+    load_scene,
+    replay,
+    statics,
+)
 
 Rows = list[tuple[int, dict[str, np.ndarray]]]
 MAPPING = """
@@ -133,6 +145,35 @@ def test_readings_that_no_rig_can_give_are_refused(fault: str) -> None:
     with pytest.raises(UsageError) as error:
         Twin(load_scene()).update(given, stamp_ns=stamp)
     assert words in str(error.value)
+
+
+MISUSES: dict[str, tuple[Callable[[], Any], str]] = {
+    "no sample": (lambda: Twin().update(3), "sample is 3. Give Sample(Stream.STROKES, stamp_ns, values)"),  # type: ignore[arg-type]
+    "settings": (lambda: Twin(None, {"health": False}), "give Settings(name=value, ..)"),  # type: ignore[arg-type]
+    "sensor": (lambda: Twin().rezero("joint_9"), "'joint_9': no sensor of this boom. Give tip_imu, or one of cylinder_1,"),
+    "start": (lambda: TimeWindow(float("nan"), 2.0), "start = nan: must be a number of seconds, at least 0."),
+    "duration": (lambda: TimeWindow(0.0, -1.0), "duration = -1.0: must be a number of seconds, at least 0."),
+}
+
+
+@pytest.mark.parametrize("misuse", MISUSES)
+def test_misuse_of_the_api_is_told_with_its_remedy(misuse: str) -> None:
+    call, words = MISUSES[misuse]
+    with pytest.raises(UsageError) as error:
+        call()
+    assert words in str(error.value)
+
+
+def test_a_session_writer_refuses_what_no_replay_would_read(rows: Rows, tmp_path: Path) -> None:
+    lengths = rows[0][1]["cylinder_strokes"]
+    with SessionWriter(tmp_path / "s") as session:
+        session.write(Sample(Stream.STROKES, np.int64(10**9), lengths))  # type: ignore[arg-type]
+        for stamp, values in ((0, lengths), (2**61, lengths), (1.5, lengths), (2 * 10**9, lengths[:2])):
+            with pytest.raises(UsageError, match=r"[Gg]ive"):
+                session.write(Sample(Stream.STROKES, stamp, values))
+    assert scan(tmp_path / "s").find("cylinder_strokes").count == 1
+    with pytest.raises(UsageError, match="the session is closed"):
+        session.write(Sample(Stream.STROKES, 2 * 10**9, lengths))
 
 
 TABLES: dict[str, tuple[Callable[[dict[str, np.ndarray]], Any], str]] = {
