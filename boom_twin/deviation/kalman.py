@@ -7,7 +7,7 @@ import math
 from ..kernels.jit import inner
 from .channels import IMU_DRIFT, IMU_SCALE, IMU_TURN, TIP_IMU_STATES
 from .rows import spread_of
-from .states import PREDICTION, all_states, drive_place, force_place, zero_place
+from .states import PREDICTION, drive_place, force_place, zero_place
 
 FAST, SLOW = 0.1, 60.0  # s, time constants of the two parts of the load
 DRIVE_TIME = 0.12  # s, correlation time of a drive's acceleration
@@ -25,11 +25,10 @@ def put_weight(f, row, place, weight):
 
 @inner
 def make_transition(p, f, h):
-    """Write the transition over `h` (s), inputs of the modes held, and the variances that the drives gain; loads follow."""
+    """Write the transition of the boom's states over `h` (s), inputs of the modes held, and the variances all states gain."""
     n, m, load, drive = p.drives.shape[0], p.modes[0], force_place(p), drive_place(p)
     f.interval[1] = h
-    for k in range(all_states(p)):
-        f.counts[k], f.variances[k] = 0, 0.0
+    f.counts[:], f.variances[:] = 0, 0.0
     for j in range(m):
         omega2, half = p.omega[j] * p.omega[j], 0.5 * p.decay[j]
         swing = math.sqrt(max(omega2 - half * half, 1e-12))
@@ -68,8 +67,6 @@ def make_transition(p, f, h):
         put_weight(f, drive + 2 * n + i, drive + 2 * n + i, kept)
         f.variances[drive + i], f.variances[drive + 2 * n + i] = LEAK * h, f.jerk[i] * h
     zero = zero_place(p)
-    for k in range(zero, all_states(p)):
-        put_weight(f, k, k, 1.0)
     for a in range(2):
         f.variances[zero + a] = f.drift[a] * IMU_DRIFT * IMU_DRIFT * h
     turned = 0.0
@@ -83,29 +80,42 @@ def make_transition(p, f, h):
     for k in range(further, p.behind[0]):
         walk = p.errors[k - further].walk
         f.variances[zero + k] = f.drift[k] * walk * walk * h
-        if p.errors[k - further].drifts:
-            put_weight(f, zero + k, zero + k + 1, h)
 
 
 @inner
 def transit(p, f, k, size, h, loads, least2):
     """Propagate the first `size` states of model `k` over the transition.
 
-    The variances of its fast load are `loads` (2,) along x and y, or `least2` where they are less; N^2.
+    Sensors' errors and copies of readings stay as they are, but for lags, which drift. So the covariance is propagated as
+
+        [ F A F^T   F B ]
+        [ B^T F^T   C   ],
+
+    with A of the boom's states, C of the others, and B between these.
+
+    The variances of the fast load are `loads` (2,) along x and y, or `least2` where they are less; N^2.
     """
-    x, covariance, load = f.x[k], f.p[k], force_place(p)
-    for i in range(size):
+    x, covariance, load, own = f.x[k], f.p[k], force_place(p), zero_place(p)
+    for i in range(own):
         total = 0.0
         for c in range(f.counts[i]):
             total += f.weights[i, c] * x[f.places[i, c]]
         f.row[i] = total
-    for i in range(size):
+    for i in range(own):
         x[i] = f.row[i]
-    multiply(f, covariance, f.half, size)
-    for i in range(size):
-        for j in range(size):
+    for i in range(own):
+        add_rows(f, i, covariance, size, f.half[i])
+    for i in range(own):
+        for j in range(own):
             f.turned[i, j] = f.half[j, i]
-    multiply(f, f.turned, covariance, size)
+        for j in range(own, size):
+            covariance[i, j] = covariance[j, i] = f.half[i, j]
+    for i in range(own):
+        add_rows(f, i, f.turned, i + 1, covariance[i])
+        for j in range(i):
+            covariance[j, i] = covariance[i, j]
+    if size > own:
+        drift_lags(p, x, covariance, size, h)
     for i in range(size):
         covariance[i, i] += f.variances[i]
     u, left = h / FAST, math.exp(-2.0 * h / FAST)
@@ -122,15 +132,35 @@ def transit(p, f, k, size, h, loads, least2):
 
 
 @inner
-def multiply(f, right, found, size):
-    """Write the product of the transition matrix and `right` (s, s)."""
-    for i in range(size):
-        for j in range(size):
-            found[i, j] = 0.0
-        for c in range(f.counts[i]):
-            weight, line = f.weights[i, c], right[f.places[i, c]]
+def drift_lags(p, x, covariance, size, h):
+    """Add to the lags of streams what they drift by in `h` (s)."""
+    further = TIP_IMU_STATES + 2 * p.drives.shape[0]
+    for k in range(further, p.behind[0]):
+        if p.errors[k - further].drifts:
+            lag = zero_place(p) + k
+            x[lag] += h * x[lag + 1]
             for j in range(size):
-                found[i, j] += weight * line[j]
+                covariance[lag, j] += h * covariance[lag + 1, j]
+            for j in range(size):
+                covariance[j, lag] += h * covariance[j, lag + 1]
+
+
+@inner
+def add_rows(f, i, right, size, found):
+    """Write row `i` of the product of the transition matrix and `right`, its first `size` entries, four terms at a time."""
+    for j in range(size):
+        found[j] = 0.0
+    count = f.counts[i]
+    for c in range(0, count - 3, 4):
+        one, two, three, four = f.weights[i, c], f.weights[i, c + 1], f.weights[i, c + 2], f.weights[i, c + 3]
+        first, second = right[f.places[i, c]], right[f.places[i, c + 1]]
+        third, fourth = right[f.places[i, c + 2]], right[f.places[i, c + 3]]
+        for j in range(size):
+            found[j] += one * first[j] + two * second[j] + three * third[j] + four * fourth[j]
+    for c in range(count - count % 4, count):
+        weight, line = f.weights[i, c], right[f.places[i, c]]
+        for j in range(size):
+            found[j] += weight * line[j]
 
 
 @inner
@@ -155,10 +185,16 @@ def correct(x, covariance, row, gain, innovation, variance, size):
     expected = variance
     for k in range(size):
         expected += row[k] * gain[k]
+    take_innovation(x, covariance, gain, innovation, expected, size)
+    return expected
+
+
+@inner
+def take_innovation(x, covariance, gain, innovation, expected, size):
+    """Correct a state and its covariance by an innovation of variance `expected`; `gain` is its covariance with the state."""
     share = innovation / expected
     for i in range(size):
         x[i] += gain[i] * share
         part = gain[i] / expected
         for k in range(size):
             covariance[i, k] -= part * gain[k]
-    return expected

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner
-from .rows import clear
 from .states import ALL_VALVES, BURST, OPEN, PREDICTION, VALVES
 
 OPENS, CLOSES = 0.3, 1.0  # 1/s, rates at which valves open, and are closed again
@@ -44,15 +43,9 @@ def interact(f, mixture, size, h):
         for source in range(count):
             new += f.chances[first + source] * switch[source, target]
         f.likely[target] = new
-        mean, spread = f.mixed_x[target], f.mixed_p[target]
-        clear(mean, size)
-        for i in range(size):
-            clear(spread[i], size)
         for source in range(count):
-            add_mean(f, first + source, f.chances[first + source] * switch[source, target] / new, mean, size)
-        for source in range(count):
-            share = f.chances[first + source] * switch[source, target] / new
-            add_spread(f, first + source, share, mean, spread, size)
+            f.shares[source] = f.chances[first + source] * switch[source, target] / new
+        blend(f, first, count, f.mixed_x[target], f.mixed_p[target], size)
     for target in range(count):
         f.chances[first + target] = f.likely[target]
         for i in range(size):
@@ -62,35 +55,31 @@ def interact(f, mixture, size, h):
 
 
 @inner
-def add_mean(f, model, share, mean, size):
-    """Add a share of a model's state to a mean."""
+def blend(f, first, count, mean, spread, size):
+    """Write mean and covariance of `count` models (2 or 3) with the probabilities `f.shares`."""
+    one, two, three = f.shares[0], f.shares[1], f.shares[2]
+    x, y, z = f.x[first], f.x[first + 1], f.x[first + count - 1]
+    if count == 2:
+        three = 0.0
     for i in range(size):
-        mean[i] += share * f.x[model, i]
-
-
-@inner
-def add_spread(f, model, share, mean, spread, size):
-    """Add a share of a model's covariance, and of its state's spread about the mean, to a covariance."""
-    if share < 1e-12:
-        return
+        mean[i] = one * x[i] + two * y[i] + three * z[i]
     for i in range(size):
-        apart = share * (f.x[model, i] - mean[i])
+        to_x, to_y, to_z = one * (x[i] - mean[i]), two * (y[i] - mean[i]), three * (z[i] - mean[i])
+        line, by_x, by_y, by_z = spread[i], f.p[first, i], f.p[first + 1, i], f.p[first + count - 1, i]
         for k in range(size):
-            spread[i, k] += share * f.p[model, i, k] + apart * (f.x[model, k] - mean[k])
+            line[k] = one * by_x[k] + two * by_y[k] + to_x * (x[k] - mean[k]) + to_y * (y[k] - mean[k])
+        if three > 1e-12:
+            for k in range(size):
+                line[k] += three * by_z[k] + to_z * (z[k] - mean[k])
 
 
 @inner
 def mix(f, mixture, size):
     """Write mean and covariance of a mixture."""
     first, count = models_of(mixture)
-    mean, spread = f.mean[mixture], f.spread[mixture]
-    clear(mean, size)
-    for i in range(size):
-        clear(spread[i], size)
     for k in range(count):
-        add_mean(f, first + k, f.chances[first + k], mean, size)
-    for k in range(count):
-        add_spread(f, first + k, f.chances[first + k], mean, spread, size)
+        f.shares[k] = f.chances[first + k]
+    blend(f, first, count, f.mean[mixture], f.spread[mixture], size)
 
 
 @inner

@@ -21,7 +21,7 @@ from ..kernels.jit import hold
 from ..kernels.result_row import places_in, prediction_width
 from ..kernels.tables import OK, SENTENCES, State, Tables, Work
 from ..predictions import Clock, Outline
-from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.kinematics import RigidJoints
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading, channels_of, streams_of
@@ -117,7 +117,7 @@ class BoomPredictor:
         places: Mapping[str, Place] = NO_PLACES,
         lagging: Collection[Stream] = (),
     ) -> None:
-        self._scene, self.plan = scene, compile_scene(scene)
+        self._joints, self.plan = RigidJoints(scene), compile_scene(scene)
         self.live: State = self.plan.state()
         self._anchor, self._work = self.plan.state(), self.plan.work()
         self._undeflected = UndeflectedBoom(scene, self.plan)
@@ -196,7 +196,7 @@ class BoomPredictor:
     def angles(self) -> Array:
         """Joint angles (rad) of the rigid boom at the newest lengths, shape (n,); those before if one is out of reach."""
         try:
-            return joint_angles_of_strokes(self._scene, self.estimate, near=self.posture.angles)
+            return self._joints.angles(self.estimate, self.posture.angles)
         except UsageError:
             return self.posture.angles.copy()
 

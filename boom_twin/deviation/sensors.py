@@ -7,7 +7,7 @@ import math
 from ..kernels.jit import inner, kernel
 from .channels import READS_ACCELERATION, READS_ANGLE, READS_COORDINATE, READS_RATE, TIP_IMU_STATES, measurement_row
 from .delayed import delayed_row, note_lateness
-from .kalman import ANGLE_ZERO, correct
+from .kalman import ANGLE_ZERO, correct, take_innovation
 from .learning import SURPRISE
 from .mixture import mix, weigh_models
 from .rows import SWAY_SHARE, clear, read, variance_of
@@ -168,13 +168,15 @@ def take_reading(p, f, channel, residual, variance):
         innovation = residual
         for i in range(every):
             innovation -= f.row[i] * (f.x[k, i] - f.mean[PREDICTION, i])
-        expected = variance + variance_of(f.row, f.p[k], f.gain, every)
+        own2 = variance_of(f.row, f.p[k], f.gain, every)
+        expected = variance + own2
         normalised2 = innovation * innovation / expected
         shown += f.chances[k] * normalised2
         tail = 1.0 + normalised2 / (DOF * ratio)
         likelihood += f.chances[k] / math.sqrt(ratio * expected * tail ** (DOF + 1.0))
         weight = min((DOF + 1.0) / (DOF + normalised2), 1.0)
-        expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, variance / weight, every)
+        expected = variance / weight + own2
+        take_innovation(f.x[k], f.p[k], f.gain, innovation, expected, every)
         f.likely[k] -= 0.5 * (innovation * innovation / expected + math.log(expected))
     f.evidence[0] += math.log(max(likelihood, 1e-300))
     f.ratio[channel] += LEARN_RATIO * (min(shown, SURPRISE * ratio) - ratio)

@@ -51,7 +51,7 @@ class Filters(NamedTuple):
     see `delayed`.
     bends : (sites, 2) accelerations that the curved ways of sites need, m/s^2. sway2 : (n,) square of the largest angle by
     which an inclinometer lately erred, rad^2.
-    places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
+    places, weights, counts : (p, k), (p, k), (p,) columns of the transition matrix by row. variances : (s,) of its noise.
     motion : (sites, 9) predicted x, y, angle of every site, m and rad, their rates, their accelerations.
     shaking : (sites, 2) mean squares of its acceleration, m^2/s^4, and of its rate of turn, rad^2/s^2. felt : (c,) specific
     force that channels of accelerometers read by that, m/s^2.
@@ -103,6 +103,7 @@ class Filters(NamedTuple):
     rows: Array
     likely: Array
     switch: Array
+    shares: Array
     shaking: Array
     motion: Array
     strokes: Array
@@ -112,7 +113,8 @@ class Filters(NamedTuple):
 def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoise) -> Filters:
     """Return filters of a boom with so many joints, modes at most, and these measured channels."""
     n, channels, sites, behind = joints, len(measured.channels), len(measured.sites), 4 + 2 * joints + len(measured.errors)
-    states = 2 * modes + LOADS + 3 * joints + behind + DELAYED
+    own = 2 * modes + LOADS + 3 * joints
+    states = own + behind + DELAYED
     return Filters(
         x=np.zeros((5, states)), p=np.zeros((5, states, states)), chances=np.zeros(5), mean=np.zeros((2, states)),
         spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
@@ -121,13 +123,13 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
         sway2=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,
         late=np.zeros(len(Stream)), copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
-        places=np.zeros((states, 8 + n), np.int64), weights=np.zeros((states, 8 + n)), counts=np.zeros(states, np.int64),
+        places=np.zeros((own, 8 + n), np.int64), weights=np.zeros((own, 8 + n)), counts=np.zeros(own, np.int64),
         variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
-        half=np.zeros((states, states)), turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)),
+        half=np.zeros((own, states)), turned=np.zeros((own, own)), mixed_x=np.zeros((3, states)),
         mixed_p=np.zeros((3, states, states)),
         row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((9, states)), likely=np.zeros(5),
-        switch=np.zeros((3, 3)), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)), strokes=np.zeros((n, 3)),
-        innovations=np.zeros((n, 2)),
+        switch=np.zeros((3, 3)), shares=np.zeros(3), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),
+        strokes=np.zeros((n, 3)), innovations=np.zeros((n, 2)),
     )  # fmt: skip
 
 

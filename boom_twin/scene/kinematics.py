@@ -129,21 +129,32 @@ def joint_angles_of_strokes(scene: Scene, strokes: Array, near: Array | None = N
     Where a stroke belongs to two angles, the one next to `near` (rad), shape (n,), if given. UsageError if a stroke is not
     reached anywhere in its joint's ``range_deg``, widened by one degree.
     """
-    start_samples = 181  # at which the angle of a stroke is looked for first
-    rows = np.zeros(len(scene.joints), LINKAGE).view(np.recarray)
-    for i in range(len(rows)):
-        rows[i] = linkage(scene, i)
-    ranges = np.radians([joint.range_deg for joint in scene.joints]) + np.array([-MARGIN, MARGIN])
-    lengths = np.array([joint.cylinder.closed_length for joint in scene.joints]) + strokes
-    angles, near = np.empty(len(rows)), np.full(len(rows), math.nan) if near is None else np.asarray(near, float)
-    angles_of_lengths(rows, lengths, near, ranges[:, 0].copy(), ranges[:, 1].copy(), start_samples, angles)
-    for i in np.flatnonzero(~np.isfinite(angles)).tolist():
-        curve = stroke_curve(scene, i, np.linspace(ranges[i, 0], ranges[i, 1], start_samples))
-        raise UsageError(
-            f"{name}_{i + 1} = {float(strokes[i]):.6g} m: joint {i + 1} reaches {np.nanmin(curve):.6g} to "
-            f"{np.nanmax(curve):.6g} m in its range_deg {scene.joints[i].range_deg}. Give a {name} inside."
-        )
-    return angles
+    return RigidJoints(scene).angles(strokes, near, name)
+
+
+class RigidJoints:
+    """Joints of the undeformed boom, for many calls of `joint_angles_of_strokes`."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self._rows = scene, np.zeros(len(scene.joints), LINKAGE).view(np.recarray)
+        for i in range(len(self._rows)):
+            self._rows[i] = linkage(scene, i)
+        ranges = np.radians([joint.range_deg for joint in scene.joints])
+        self._low, self._high = ranges[:, 0] - MARGIN, ranges[:, 1] + MARGIN
+        self._closed = np.array([joint.cylinder.closed_length for joint in scene.joints])
+
+    def angles(self, strokes: Array, near: Array | None = None, name: str = "stroke") -> Array:
+        """See `joint_angles_of_strokes`."""
+        rows, start_samples = self._rows, 181  # angles at which that of a stroke is looked for first
+        angles, near = np.empty(len(rows)), np.full(len(rows), math.nan) if near is None else np.asarray(near, float)
+        angles_of_lengths(rows, self._closed + strokes, near, self._low, self._high, start_samples, angles)
+        for i in np.flatnonzero(~np.isfinite(angles)).tolist():
+            curve = stroke_curve(self._scene, i, np.linspace(self._low[i], self._high[i], start_samples))
+            raise UsageError(
+                f"{name}_{i + 1} = {float(strokes[i]):.6g} m: joint {i + 1} reaches {np.nanmin(curve):.6g} to "
+                f"{np.nanmax(curve):.6g} m in its range_deg {self._scene.joints[i].range_deg}. Give a {name} inside."
+            )
+        return angles
 
 
 def gravity_in_base(scene: Scene) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from default_boom import strokes_of_posture
+from deviation.test_models import transition_of
 
 from boom_twin import Settings, Stream, load_scene, statics
 from boom_twin.deviation.channels import measurement_row
@@ -40,10 +41,7 @@ def test_late_readings_give_the_estimate_of_all_readings_in_their_order() -> Non
         note_lateness(p, f, stream, int(own[0]), int(own[-1]) + 1, LATE * h)
     size = all_states(p)
     make_transition(p, f, h)
-    transition = np.zeros((size, size))
-    for row in range(size):
-        for k in range(int(f.counts[row])):
-            transition[row, f.places[row, k]] += f.weights[row, k]
+    transition = transition_of(p, f, size)
     rows = np.zeros((N + len(late), f.x.shape[1]))
     for i in range(N):
         length_row(p, i, rows[i])

@@ -8,11 +8,13 @@ from default_boom import strokes_of_posture
 from scipy.linalg import expm
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
-from boom_twin.deviation.kalman import DRIVE_TIME, FAST, SLOW, correct, make_transition
+from boom_twin.deviation.kalman import DRIVE_TIME, FAST, SLOW, correct, make_transition, transit
 from boom_twin.deviation.mixture import mix
+from boom_twin.deviation.posture import Posture
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.deviation.rows import length_row
-from boom_twin.deviation.states import LOADS, PREDICTION
+from boom_twin.deviation.states import ALL_VALVES, LOADS, PREDICTION, Filters, all_states, zero_place
+from boom_twin.types import Array
 
 SCENE = load_scene()
 DRIVES = strokes_of_posture(SCENE, "arch")
@@ -48,11 +50,37 @@ def test_transition_is_that_of_the_continuous_system_with_inputs_held(boom: Boom
     for i in range(N):
         expected[drive + 2 * N + i, drive + 2 * N + i] = np.exp(-h / DRIVE_TIME)
     make_transition.py_func(p, f, h)
-    found = np.zeros((size, size))
-    for row in range(size):
+    assert transition_of(p, f, size) == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def transition_of(p: Posture, f: Filters, size: int) -> Array:
+    """The first `size` rows and columns of the transition matrix as a full one; sensors' errors and copies stay."""
+    found, own = np.eye(size), zero_place.py_func(p)
+    found[:own] = 0.0
+    for row in range(own):
         for k in range(int(f.counts[row])):
             found[row, f.places[row, k]] += f.weights[row, k]
-    assert found == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    return found
+
+
+def test_covariance_is_propagated_by_the_full_transition_matrix_and_lags_drift() -> None:
+    """Every state has a random covariance with every other."""
+    boom, h, rng = BoomPredictor(SCENE, Settings(), lagging=[Stream.ANGLES]), 0.005, np.random.default_rng(7)
+    boom.start(REST.lengths)
+    p, f = boom.posture, boom.filters
+    p.behind[0] += len(p.errors)  # the last are the lag and its drift; a first reading admits them
+    size = all_states.py_func(p)
+    make_transition.py_func(p, f, h)
+    transition = transition_of(p, f, size)
+    transition[size - 2, size - 1] = h
+    f.p[ALL_VALVES] = 0.0
+    transit.py_func(p, f, ALL_VALVES, size, h, f.load2[0], 0.0)
+    noise, root, x = f.p[ALL_VALVES, :size, :size].copy(), rng.normal(size=(size, size)), rng.normal(size=size)
+    f.x[ALL_VALVES, :size], f.p[ALL_VALVES, :size, :size] = x, root @ root.T
+    transit.py_func(p, f, ALL_VALVES, size, h, f.load2[0], 0.0)
+    assert f.x[ALL_VALVES, :size] == pytest.approx(transition @ x, rel=1e-9, abs=1e-9)
+    expected = transition @ root @ root.T @ transition.T + noise
+    assert f.p[ALL_VALVES, :size, :size] == pytest.approx(expected, rel=1e-9, abs=1e-6)
 
 
 def test_reading_is_taken_as_the_textbook_has_it() -> None:
