@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -17,11 +17,11 @@ from typing import Any
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString, LiteralScalarString
 
 from ..config.settings import Settings, checked, load_settings
-from ..config.yaml_text import LARGEST_FILE, plain, read_plain
+from ..config.yaml_text import LARGEST_FILE, plain, read_plain, words
 from ..errors import BagError, Fault, SceneError, UsageError
 from ..messages.mapping import load_mapping, mapping_from
 from ..messages.topic_table import Topics
-from ..scene.edit import anew
+from ..scene.edit import anew, differences
 from ..scene.load import DEFAULT_NAME, SceneSource, as_scene, default_text, examine_text, read_text
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
@@ -237,9 +237,11 @@ def scene_from(source: SceneSource | SessionScene) -> SessionScene:
 
 def scene_of(session: Path, given: SceneSource | SessionScene = None) -> SessionScene:
     """Return the scene of a session: what is `given`, else from its ``session.yaml``, else from the package."""
-    own = kept(session, "scene", "--scene") if given is None else None
-    if own is None:
-        return scene_from(given)
+    if given is not None:
+        found = scene_from(given)
+        return replace(found, oddities=(*found.oddities, *_other_values(session, found.scene)))
+    if (own := kept(session, "scene", "--scene")) is None:
+        return scene_from(None)
     recorded, digest = kept(session, "scene_sha256", "--scene"), sha256(own.text)
     try:
         scene, oddities = examine_text(own.text, own.source, whole=recorded is not None and recorded.text == digest)
@@ -250,6 +252,20 @@ def scene_of(session: Path, given: SceneSource | SessionScene = None) -> Session
         bound = f"{own.source} has {digest[:12]}..: it was changed since the session was made"
         oddities = [Fault("scene_sha256", recorded.text, bound, "Give the scene that is right by --scene."), *oddities]
     return SessionScene(scene, own.text, own.source, tuple(oddities))
+
+
+def _other_values(session: Path, scene: Scene) -> list[Fault]:
+    """Return a note if `scene` has other values than the scene that the session keeps, as that of another boom has."""
+    try:
+        own = kept(session, "scene", "--scene")
+        others = [] if own is None else differences(examine_text(own.text, own.source)[0], scene)
+    except (BagError, SceneError):
+        return []  # whoever reads that scene is told
+    if own is None or not others:
+        return []
+    (place, value), more = others[0], f", and {len(others) - 1} more" if len(others) > 1 else ""
+    told = f"differs from the scene of the session ({own.source}){more}"
+    return [Fault(words(place), value, told, "If it is of another boom, leave out --scene.", kind="note")]
 
 
 @dataclass(frozen=True, slots=True)

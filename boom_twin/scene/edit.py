@@ -164,12 +164,18 @@ def rewritten(text: str, scene: Scene, wanted: Scene) -> str:
     return text if same else anew(wanted)
 
 
+def differences(before: Scene, after: Scene) -> list[tuple[Place, Any]]:
+    """Return the places of the values of the model that differ, and their values in `after`."""
+    texts = {"description", "postures"}
+    return [*_changes(before.model_dump(exclude=texts), after.model_dump(exclude=texts), ())]
+
+
 def _changes(before: Any, after: Any, place: Place) -> Iterator[tuple[Place, Any]]:
     """Yield the places of the single values that differ, with their new ones."""
     if isinstance(after, dict):
         for key, value in after.items():
             yield from _changes(before.get(key) if isinstance(before, dict) else None, value, (*place, key))
-    elif isinstance(after, tuple) and isinstance(before, tuple):
+    elif isinstance(after, tuple) and isinstance(before, tuple) and len(after) == len(before):
         for i, (one, other) in enumerate(zip(before, after, strict=True)):
             yield from _changes(one, other, (*place, i))
     elif after != before:

@@ -269,7 +269,7 @@ EVENTS = {
     "unmatched": "no prediction at the stamp of this sample; no residual",
 }
 
-CONSEQUENCES = frozenset({"waiting", "model"})
+CONSEQUENCES = frozenset({"waiting", "model", "unmatched"})
 """Events that follow from others."""
 
 TOLD_AT_ONCE = frozenset({"restart", "stroke elsewhere", "clock set", "jump back", "reset", "load", "limits", "zero"})

@@ -42,6 +42,15 @@ def test_a_cylinder_without_a_single_value_is_named(tmp_path):
         replay(session(tmp_path / "bag", strokes=strokes), load_scene(), tmp_path / "out")
 
 
+def test_strokes_that_come_too_rarely_are_not_told_by_the_residuals_that_lack(tmp_path):
+    strokes = strokes_of_posture(load_scene(), "arch")
+    stamps, still = START + np.arange(400) * STEP, np.tile(strokes, (400, 1))
+    still[np.arange(400) % 40 > 0] = np.nan  # angles 40 times as often
+    write_session(tmp_path / "bag", stamps, still, np.zeros_like(still), None, {"origin": "synthetic, a test"})
+    with pytest.raises(BagError, match=r"Most often leap: .* within `gap`"):
+        replay(tmp_path / "bag", load_scene(), tmp_path / "out")
+
+
 def test_a_constant_residual_is_not_said_to_be_as_expected(tmp_path):
     result = replay(session(tmp_path / "bag"), load_scene(), tmp_path / "out")  # all angles recorded are 0: none is right
     mean = np.abs(result.summary["joint_residual_normalised_mean"])

@@ -142,6 +142,14 @@ def test_a_broken_scene_in_a_session_is_one_line_with_the_remedy(text, words, tm
         assert words in told and "Give the scene by --scene." in told and told.count("\n") == 1
 
 
+def test_a_given_scene_with_other_values_than_the_recorded_one_is_told(five):
+    own = scene_of(five).scene
+    assert scene_of(five, own.with_(postures={})).oddities == ()
+    (told,) = scene_of(five, own.with_(payload=40.0, line_fill=12.0)).oddities
+    assert told.is_note and f"differs from the scene of the session ({five / FILE_NAME}, scene), and 1 more" in str(told)
+    assert scene_of(five, load_scene()).oddities[0].path == "sections"
+
+
 def test_a_scene_that_was_changed_is_told(five, tmp_path, capsys):
     bag = without_scene(five, tmp_path / "bag")
     sheet = (five / FILE_NAME).read_text()
