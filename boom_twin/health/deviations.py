@@ -17,7 +17,7 @@ from .stream_readings import ENOUGH, StreamReadings
 KIND = "deviation"  # kind of all its alarms
 SIGMAS = {Stream.ANGLES: 3.0, Stream.FORCES: 10.0}
 """Standard deviations that a mean residual has to exceed, beside its limit. Deviations of forces lack the model error."""
-LAG = 0.4  # s; a residual explained by a smaller delay of stamps is no deviation, see `delay_monitor`
+LAG = 0.4  # s; a residual explained by a smaller delay of stamps is no deviation, see `lag_monitor`
 LASTING = 3_000_000_000  # ns, debounce time: in fast motion a mean is off for two seconds
 GONE = 0.5  # share of the limit below which a deviation ends
 SETTLED = 5_000_000_000  # ns below that share before it ends
