@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..types import SENSORS, Alarm, Array, Stream, channels_of
+from .alarms import change_text
 from .blocks import Block
 from .stream_readings import ENOUGH, StreamReadings
 
@@ -82,5 +83,5 @@ class DeviationMonitor:
     def _evidence(self, i: int, off: Array) -> str:
         """Return the deviation of channel `i` in figures."""
         factor, unit = SENSORS[self._stream].shown_unit
-        tip = "" if self._reach is None else f", up to {1e3 * abs(off) * self._reach[i]:.0f} mm at the tip"
-        return f"by {float(f'{factor * off:.3g}'):+g} {unit}{tip}"
+        tip = "" if self._reach is None else f", tip {1e3 * abs(off) * self._reach[i]:.0f} mm"
+        return change_text(factor * float(off), unit) + tip

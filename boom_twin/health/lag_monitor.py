@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..types import SENSORS, Alarm, Array, Stream
 from ..wiring.readings import CLEAR, Lag, lag_near
+from .alarms import change_text
 from .blocks import Block
 from .stream_readings import StreamReadings
 
@@ -77,7 +78,7 @@ class LagMonitor:
         news = [replace(self._alarms.pop(stream), until=end) for stream in list(self._alarms) if stream in near]
         for stream, lag in late.items():
             if stream not in self._alarms:
-                name, evidence = stream.value, f"{1e3 * lag.lag:+.0f} ms ± {1e3 * lag.sigma:.0f} ms"
+                name, evidence = stream.value, change_text(1e3 * lag.lag, "ms", 1e3 * lag.sigma)
                 self._alarms[stream] = Alarm(name, "late", end, None, f"{name}.delay", evidence)
                 news.append(self._alarms[stream])
         return news
