@@ -1,7 +1,7 @@
 """Alarm sentences, and translations (``texts.json``) of all texts for operators.
 
 The sentences are used by `/diagnostics`, live page, report, ``summary.json`` and command line. Sentences hold no figures:
-figures are the alarm's evidence.
+figures are the alarm's evidence, which has no words.
 """
 
 from __future__ import annotations
@@ -46,6 +46,7 @@ SENTENCES = {
     "spikes": Sentence("{thing} gives single readings far from their neighbours", "Check its cable and plug"),
     "jump": Sentence("{thing} jumped at once, as no boom can", "Check its mount; if it stays, set its zero"),
     "dropout": Sentence("{thing} gives no readings", "Check its cable, supply and driver"),
+    "intermittent": Sentence("{thing} fails again and again", "Check its cable and plug"),
     "range": Sentence("{thing} reads what it cannot", "Check its unit, sign and zero in the mapping"),
     "wiring": Sentence(
         "{thing} is wired otherwise than the mapping says", "Record slow moves, then run `boom_twin mapping --check`"
@@ -84,8 +85,6 @@ SENTENCES = {
     "": Sentence("{thing} does not behave as the model", "Look at it"),
 }
 """Sentences by kind of alarm, some by kind of channel or parameter too. The last one is for unknown kinds."""
-LIKELY = ((0.99, "almost certain"), (0.9, "very likely"), (0.66, "likely"), (0.33, "possible"), (0.0, "unlikely"))
-"""Least probability for each word."""
 
 _TRANSLATIONS: dict[str, list[str]] = {}
 
@@ -101,11 +100,6 @@ def translated(english: str, language: str = "en") -> str:
     """Return the translation of a text, or the English text if there is none."""
     others = None if language == "en" else translations().get(english)
     return english if others is None else others[LANGUAGES.index(language) - 1]
-
-
-def likelihood(probability: float) -> str:
-    """Return a probability in words."""
-    return next(words for least, words in LIKELY if probability >= least)
 
 
 def alarm_sentence(channel: str, kind: str, cause: str | None) -> Sentence:

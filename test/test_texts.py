@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 import boom_twin
-from boom_twin.texts import LANGUAGES, LIKELY, SENTENCES, THINGS, alarm_text, likelihood, translated, translations
+from boom_twin.health.alarms import change_text, evidence_with_cause
+from boom_twin.texts import LANGUAGES, SENTENCES, THINGS, alarm_text, translated, translations
 from boom_twin.twin.blocks import event_meaning
 from boom_twin.types import SENSORS, StrokeReading
 
@@ -83,8 +84,10 @@ def test_a_sentence_names_the_thing_and_ends_with_what_to_do(alarm: tuple[str, s
     assert len({alarm_text(*alarm, language) for language in LANGUAGES}) == len(LANGUAGES)
 
 
-def test_probabilities_in_words() -> None:
-    assert [likelihood(least) for least, _ in LIKELY] == [words for _, words in LIKELY]
+def test_evidence_is_figures_alone() -> None:
+    """So it reads alike in all languages."""
+    assert change_text(0.01, "rad", 1e-3) == "+0.573 deg (+- 0.057)" and change_text(-4642.0, "N") == "-4640 N"
+    assert evidence_with_cause("+3 kg", [("tip.payload", 0.999), ("unknown", 0.001)]) == "+3 kg; tip.payload 99 %"
     assert translated("no such text", "de") == "no such text"
 
 

@@ -186,7 +186,7 @@ def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats
     Faults have the texts of alarms of `boom_twin.health`.
     """
     thresholds, unit = judge.at.thresholds, sensor.unit
-    if not stats.stamp and not sensor.required:
+    if not stats.stamp and not sensor.required and isnan(stats.missing):  # no message, not even one that is left out
         return judge.finish("not there; optional")
     judge.note({f"value_{unit}": stats.value, "rate_Hz": stats.rate})
     judge.check_age(age, "no reading" if stats.stamp else "no reading yet")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from math import nan
+from math import degrees, nan
 
-from ..texts import likelihood
 from ..types import NANO, Alarm, Health, Ranked
 
 PROBABILITY = ": probability"
@@ -98,13 +97,16 @@ def alarm_of(channel: str, values: Mapping[str, str]) -> Alarm:
     return Alarm(channel, values["kind"], since, until, values["cause"] or None, values.get("evidence", ""), tuple(ranked))
 
 
+def change_text(change: float, unit: str, sigma: float | None = None) -> str:
+    """Return a change, with its standard deviation, in figures that read alike in all languages; angles in degrees."""
+    factor, unit = (degrees(1.0), "deg") if unit == "rad" else (1.0, unit)
+    doubt = "" if sigma is None else f" (+- {float(f'{factor * sigma:.2g}'):g})"
+    return f"{float(f'{factor * change:.3g}'):+g} {unit}{doubt}"
+
+
 def evidence_with_cause(evidence: str, causes: Iterable[tuple[str, float]]) -> str:
-    """Return the evidence of an alarm with its two most probable causes in words."""
-    found = [
-        f"{'something else' if cause == UNKNOWN else cause} {likelihood(chance)}"
-        for cause, chance in list(causes)[:2]
-        if chance >= 0.005
-    ]
+    """Return the evidence of an alarm with the probabilities of its two most probable causes."""
+    found = [f"{cause} {min(100.0 * chance, 99.0):.0f} %" for cause, chance in list(causes)[:2] if cause != UNKNOWN]
     return "; ".join(part for part in (evidence, ", ".join(found)) if part)
 
 

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..types import SENSORS, Alarm, Array, Stream, channels_of
+from .alarms import change_text
 from .blocks import Block
 from .stream_readings import ENOUGH, StreamReadings
 
 KIND = "deviation"  # kind of all its alarms
 SIGMAS = {Stream.ANGLES: 3.0, Stream.FORCES: 10.0}
 """Standard deviations that a mean residual has to exceed, beside its limit. Deviations of forces lack the model error."""
-LAG = 0.4  # s; a residual explained by a smaller delay of stamps is no deviation, see `delay_monitor`
+LAG = 0.4  # s; a residual explained by a smaller delay of stamps is no deviation, see `lag_monitor`
 LASTING = 3_000_000_000  # ns, debounce time: in fast motion a mean is off for two seconds
 GONE = 0.5  # share of the limit below which a deviation ends
 SETTLED = 5_000_000_000  # ns below that share before it ends
@@ -82,5 +83,5 @@ class DeviationMonitor:
     def _evidence(self, i: int, off: Array) -> str:
         """Return the deviation of channel `i` in figures."""
         factor, unit = SENSORS[self._stream].shown_unit
-        tip = "" if self._reach is None else f", up to {1e3 * abs(off) * self._reach[i]:.0f} mm at the tip"
-        return f"by {float(f'{factor * off:.3g}'):+g} {unit}{tip}"
+        tip = "" if self._reach is None else f", tip {1e3 * abs(off) * self._reach[i]:.0f} mm"
+        return change_text(factor * float(off), unit) + tip

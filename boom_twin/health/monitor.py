@@ -12,9 +12,9 @@ from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Place, Stream, StrokeReading
 from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows, PredictionRows
 from .causes import explains
-from .delay_monitor import DelayMonitor
 from .deviations import SIGMAS, DeviationMonitor
 from .fault_twins import FaultTwins
+from .lag_monitor import LagMonitor
 from .sensor_check import NOISE_OVER, SensorCheck, sensor_ranges
 from .sensor_monitor import SensorMonitor
 from .stream_readings import StreamReadings, StreamSurvey
@@ -74,7 +74,7 @@ class HealthMonitor:
             if stream is not Stream.STROKES or stream is self._drive
         }
         self._imus = [stream for stream in self._channels if SENSORS[stream].is_accelerometer]
-        self._delay = DelayMonitor()
+        self._lags = LagMonitor(self._drive)
         compared = [stream for stream in SIGMAS if stream is not self._drive]
         self._deviations = {stream: DeviationMonitor(stream, scene, settings) for stream in compared}
         self._wiring, self._load = WiringMonitor(scene, reads, mounts, places), TipLoadMonitor(settings.tip_load_limit)
@@ -98,7 +98,7 @@ class HealthMonitor:
         }
         for sensors in self._sensors.values():
             sensors.begin()
-        self._delay.begin()
+        self._lags.begin()
         self._wiring.begin()
         self._load.begin()
 
@@ -130,7 +130,7 @@ class HealthMonitor:
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
         """Return which channels of a stream are not compared with the prediction."""
         masked = self._sensors[stream].masked | self._wiring.wrong(stream)
-        return masked | (stream is Stream.ANGLES and self._delay.alarm is not None)
+        return masked | self._lags.is_late(stream)
 
     def judge(self, stamp: int, loads: tuple[Array, Array], tip_sigmas: Callable[[], Array]) -> Health | None:
         """Judge the blocks that strokes with `stamp` (ns) complete; return None if there is nothing to report.
@@ -144,7 +144,7 @@ class HealthMonitor:
         """
         done = self._blocks.close(stamp)
         news = [alarm for block in done if block.followed for alarm in self._judge(block)]
-        if any(alarm.kind == "late" for alarm in self._named):  # late readings look like forces
+        if any(alarm.kind == "late" for alarm in (*self._lags.alarms, *self._named)):  # late readings look like forces
             self._load.begin()
         else:
             news += self._load.take(stamp, *loads)
@@ -171,7 +171,8 @@ class HealthMonitor:
         for sensors in self._sensors.values():
             yield from (alarm for alarm in sensors.alarms if not self._wiring.explains(alarm))
         yield from self._wiring.alarms
-        yield from (alarm for alarm in (self._delay.alarm, self._load.alarm) if alarm is not None)
+        yield from (alarm for alarm in self._lags.alarms if all(alarm.cause != each.cause for each in self._named))
+        yield from () if self._load.alarm is None else (self._load.alarm,)
         for stream, deviations in self._deviations.items():
             yield from (alarm for alarm in deviations.alarms if not any(explains(each, stream, alarm) for each in self._named))
         yield from self._named
@@ -199,12 +200,12 @@ class HealthMonitor:
     def _compare(self, block: Block, readings: dict[Stream, StreamReadings], strokes: Array) -> list[Alarm]:
         """Compare readings with the prediction; `strokes` (n,) are means of the measured ones, m."""
         news = list[Alarm]()
+        failing = {stream: sensors.masked for stream, sensors in self._sensors.items()}
         if self._drive is not Stream.ANGLES:
-            news += self._wiring.take(block, strokes, {stream: sensors.masked for stream, sensors in self._sensors.items()})
+            news += self._wiring.take(block, strokes, failing)
         if self._wiring.has_wrong_strokes:
             return news
-        if self._drive is not Stream.ANGLES:
-            news += self._delay.take(readings[Stream.ANGLES], self._sensors[Stream.ANGLES].masked, block)
+        news += self._lags.take(readings, failing, block)
         for stream, deviations in self._deviations.items():
             news += deviations.take(readings[stream], self._masked(stream), block)
         return news

@@ -1,4 +1,7 @@
-"""Monitor single sensors: findings in their readings become alarms, and an alarm ends when its finding is gone."""
+"""Monitor single sensors: findings in their readings become alarms, and an alarm ends when its finding is gone.
+
+A sensor that fails again within `AGAIN` has an intermittent contact: one alarm, until it has been well for so long.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,12 @@ from typing import Any
 import numpy as np
 
 from ..sensor_kinds import SensorKind
-from ..types import Alarm, Array
+from ..types import NANO, Alarm, Array
+from .alarms import change_text
 from .sensor_check import MISSTATED, NOISE_OVER, Flags, SensorFindings
 
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended
+AGAIN = 60_000_000_000  # ns between failures of one intermittent contact
 CAME_BACK = 0.3  # of a jump, by which a sensor that came back may still be off
 MEASURED = 4.0  # times the stated noise, above which there may be more: a reading counts for so much at most
 
@@ -35,6 +40,11 @@ class _Fault:
     offset: float = 0.0
     before: float = math.nan
     """Residual before a jump."""
+    is_told: bool = True
+
+    def ended(self, until: int) -> list[Alarm]:
+        """Return the alarm with its end, if it was told."""
+        return [replace(self.alarm, until=until)] if self.is_told else []
 
 
 class SensorMonitor:
@@ -63,6 +73,8 @@ class SensorMonitor:
         self._names, self._sensors, self._is_predicted = names, kind, is_predicted
         self._there = np.array([name not in absent for name in names])
         self._faults: dict[tuple[int, str], _Fault] = {}
+        self._onsets: dict[int, list[int]] = {}  # of failures, by channel, ns
+        self._intermittent: dict[int, Alarm] = {}  # by channel
         self._none: Flags = np.zeros(len(names), dtype=bool)
         self.masked, self._is_anew = self._none, False
 
@@ -73,13 +85,13 @@ class SensorMonitor:
     @property
     def alarms(self) -> tuple[Alarm, ...]:
         """Alarms that last."""
-        return tuple(fault.alarm for fault in self._faults.values()) if self._faults else ()
+        return (*(fault.alarm for fault in self._faults.values() if fault.is_told), *self._intermittent.values())
 
     def _mask(self) -> None:
         """Mask the channels that have faults by now."""
-        self.masked = self._none.copy()
-        for channel, kind in self._faults:
-            self.masked[channel] |= kind != "spikes"
+        masked = self._none.copy()
+        masked[[channel for channel, kind in self._faults if kind != "spikes"]] = True
+        self.masked = self.masked if (masked == self.masked).all() else masked
 
     def take(
         self,
@@ -93,10 +105,9 @@ class SensorMonitor:
         `newest`: by how much the block's last readings are off (strokes: the readings), shape (channels,), if it has any.
         """
         news = self._back_after_start(end, newest)
-        if not findings.is_calm or self._faults:
+        if not findings.is_calm or self._faults or self._intermittent:
             news += self._found(findings, start, end, newest)
-        if news:
-            self._mask()
+        self._mask()
         return news
 
     def _found(self, findings: SensorFindings, start: int, end: int, newest: Array | None) -> list[Alarm]:
@@ -109,7 +120,8 @@ class SensorMonitor:
                 if kind == "jump" and self._is_wild(channel):
                     continue
                 jump = (float(findings.jumped[channel]), float(findings.level[channel])) if kind == "jump" else None
-                evidence = self._offset(float(findings.level[channel])) if kind == "range" else ""
+                off = float(findings.level[channel]) if kind == "range" and self._is_predicted else math.nan
+                evidence = change_text(off, self._sensors.unit) if math.isfinite(off) else ""
                 news += self._seen(channel, kind, start, end, jump, evidence)
         for key, fault in list(self._faults.items()):
             off = abs(float(newest[key[0]])) if newest is not None and self._is_predicted else math.inf
@@ -117,8 +129,10 @@ class SensorMonitor:
                 fault.seen = end
             if end - fault.seen > SETTLED:
                 del self._faults[key]
-                news.append(replace(fault.alarm, until=fault.seen))
-        return news
+                news += fault.ended(fault.seen)
+        failing = {channel for channel, _ in self._faults}
+        well = [c for c in self._intermittent if c not in failing and end - self._onsets[c][-1] > AGAIN]
+        return [*news, *(replace(self._intermittent.pop(channel), until=end) for channel in well)]
 
     def _back_after_start(self, end: int, newest: Array | None) -> list[Alarm]:
         """End jumps of sensors that read what they had before, with the first readings after a start from rest."""
@@ -129,19 +143,12 @@ class SensorMonitor:
             is_jump = key[1] == "jump" and not self._is_predicted
             if is_jump and abs(newest[key[0]] - fault.before) < CAME_BACK * abs(fault.offset):
                 del self._faults[key]
-                news.append(replace(fault.alarm, until=end))
+                news += fault.ended(end)
         return news
 
     def _is_wild(self, channel: int) -> bool:
         """Return True if jumps mean nothing: the sensor has another fault, out of which it jumps when it recovers."""
         return (channel, "jump") not in self._faults and any(known == channel for known, _ in self._faults)
-
-    def _offset(self, off: float) -> str:
-        """Return by how much a reading is off the model, in words; empty where no model says what it should read."""
-        if not (self._is_predicted and math.isfinite(off)):
-            return ""
-        turned = f"{math.degrees(off):+.4g} deg, " if self._sensors.unit == "rad" else ""
-        return f"an offset of {turned}{off:+.4g} {self._sensors.unit}"
 
     def _seen(
         self, channel: int, kind: str, start: int, end: int, jump: tuple[float, float] | None, evidence: str
@@ -154,13 +161,20 @@ class SensorMonitor:
             off = min(abs(fault.offset + size), abs(level - fault.before)) if math.isfinite(level) else abs(fault.offset + size)
             if size * fault.offset < 0.0 and off < CAME_BACK * abs(fault.offset):
                 del self._faults[key]
-                return [replace(fault.alarm, until=end)]
+                return fault.ended(end)
             fault.seen = end
             return []
         name = self._names[channel]
-        if size:
-            evidence = (
-                f"by {math.degrees(size):+.3g} deg" if self._sensors.unit == "rad" else f"by {size:+.3g} {self._sensors.unit}"
-            )
-        self._faults[key] = _Fault(Alarm(name, kind, start, None, f"{name}.sensor", evidence), end, size, level - size)
-        return [self._faults[key].alarm]
+        evidence = change_text(size, self._sensors.unit) if size else evidence
+        is_first = all(known != channel for known, _ in self._faults)
+        if is_first:
+            self._onsets[channel] = [*(t for t in self._onsets.get(channel, []) if start - t < AGAIN), start]
+        onsets, cause = self._onsets[channel], f"{name}.sensor"
+        alarm = Alarm(name, kind, start, None, cause, evidence)
+        self._faults[key] = _Fault(alarm, end, size, level - size, len(onsets) == 1)
+        if not is_first or len(onsets) == 1:
+            return [alarm] if len(onsets) == 1 else []
+        since = self._intermittent[channel].since if channel in self._intermittent else start
+        times = f"{len(onsets)}x / {(start - onsets[0]) * NANO:.0f} s"
+        self._intermittent[channel] = Alarm(name, "intermittent", since, None, cause, times)
+        return [self._intermittent[channel]]

@@ -39,14 +39,12 @@ class ReadingsWork(NamedTuple):
     """State of `summarise` for one stream.
 
     stated : variance of the noise.
-    counts, off, rates : (channels,) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
+    counts : (channels,) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
     slow : SlowMeans.
     """
 
     stated: float
     counts: Array
-    off: Array
-    rates: Array
     slow: SlowMeans
 
 
@@ -279,7 +277,7 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
     share : float
         Weight of the block in the slow means.
     """
-    counts, means, rates, slow, last = work.counts, work.off, work.rates, work.slow, stamps.shape[0] - 1
+    counts, slow, last = work.counts, work.slow, stamps.shape[0] - 1
     span = (stamps[last] - stamps[0]) * NANO
     for i in range(raw.shape[1]):
         known, read, off, variance = 0, 0.0, 0.0, 0.0
@@ -289,9 +287,8 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
                 read += raw[t, i]
                 off += left[t, i]
                 variance += sigmas[t, i] * sigmas[t, i]
-        counts[i], means[i], rates[i] = known, off / max(known, 1), math.nan
-        if span > 0.0:
-            rates[i] = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span
+        counts[i] = known
+        rate = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span if span > 0.0 else math.nan
         if masked[i]:
             for each in (slow.read, slow.expected, slow.variance, slow.rate, slow.weight):
                 each[i] = 0.0
@@ -300,8 +297,8 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
             slow.expected[i] += share * ((read - off) / known - slow.expected[i])
             slow.variance[i] += share * (variance / known - slow.variance[i])
             slow.weight[i] += share * (1.0 - slow.weight[i])
-        if math.isfinite(rates[i]) and not masked[i]:
-            slow.rate[i] += share * (rates[i] - slow.rate[i])
+        if math.isfinite(rate) and not masked[i]:
+            slow.rate[i] += share * (rate - slow.rate[i])
     return is_bent(work, raw, masked)
 
 

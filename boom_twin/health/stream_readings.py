@@ -1,4 +1,4 @@
-"""Numbers of a block of readings of one stream, worked out once for all that judge it: means, rates, slow means, motion."""
+"""Numbers of a block of readings of one stream, worked out once for all that judge it: slow means, motion."""
 
 from __future__ import annotations
 
@@ -24,10 +24,6 @@ class StreamReadings(NamedTuple):
     rows : MeasuredRows
     counts : ndarray, shape (channels,)
         Readings that the model has something to compare with.
-    off : ndarray, shape (channels,)
-        Mean residual in the unit of the sensor; 0 of none.
-    rates : ndarray, shape (channels,)
-        Rate of the expected reading from the first to the last, per s; NaN of fewer than two.
     slow : SlowMeans
     is_bent : bool
         True if trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by second and
@@ -36,8 +32,6 @@ class StreamReadings(NamedTuple):
 
     rows: MeasuredRows
     counts: Array
-    off: Array
-    rates: Array
     slow: SlowMeans
     is_bent: bool
 
@@ -57,11 +51,10 @@ class StreamSurvey:
     """
 
     def __init__(self, variance: float, channels: int) -> None:
-        self.slow, numbers = SlowMeans(*np.zeros((5, channels))), np.zeros((3, channels))
-        self._work = ReadingsWork(variance, numbers[0], numbers[1], numbers[2], self.slow)
+        self.slow = SlowMeans(*np.zeros((5, channels)))
+        self._work = ReadingsWork(variance, np.zeros(channels), self.slow)
         self._held = hold(self._work)
-        none, unknown = np.zeros(channels), np.full(channels, np.nan)
-        self._nothing = StreamReadings(MeasuredRows.room(0, channels), none, none, unknown, self.slow, False)
+        self._nothing = StreamReadings(MeasuredRows.room(0, channels), np.zeros(channels), self.slow, False)
         self._summarise = SameTypes(summarise)
 
     def take(self, rows: MeasuredRows | None, masked: NDArray[np.bool_], span: float) -> StreamReadings:
@@ -80,5 +73,4 @@ class StreamSurvey:
             return self._nothing
         columns = map(np.ascontiguousarray, rows)
         is_bent = self._summarise(self._held, *columns, masked, min(1.0, span / WINDOW))
-        work = self._work
-        return StreamReadings(rows, work.counts.copy(), work.off.copy(), work.rates.copy(), self.slow, bool(is_bent))
+        return StreamReadings(rows, self._work.counts.copy(), self.slow, bool(is_bent))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..types import Alarm, Array, Ranked
+from .alarms import change_text
 
 CAUSE = "tip.load"
 CERTAIN = 3.0  # standard deviations by which a force is above the limit, or contradicts the lengths
@@ -56,7 +57,7 @@ class TipLoadMonitor:
         if self.alarm is not None or stamp - self._since < AFTER:
             return []
         size, sigma = self._largest
-        evidence = f"{size:.0f} N (+- {sigma:.0f}), limit {self._limit:g} N (tip_load_limit)"
+        evidence = f"{change_text(size, 'N', sigma)}, tip_load_limit {self._limit:g} N"
         ranked = (Ranked(CAUSE, 1.0, (("exceeded", size, sigma, "N"),)),)
         self.alarm = Alarm("tip", "exceeded", self._since, None, CAUSE, evidence, ranked)
         return [self.alarm]

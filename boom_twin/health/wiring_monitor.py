@@ -90,7 +90,7 @@ class WiringMonitor:
     def explains(self, alarm: Alarm) -> bool:
         """Return True if an alarm of a single sensor is a consequence of its wiring."""
         channels = {name for stream, names in self._channels.items() for name in _chosen(names, self._all(stream))}
-        return alarm.kind in {"range", "jump", "noise", "spikes"} and alarm.channel in channels
+        return alarm.kind in {"range", "jump", "noise", "spikes", "intermittent"} and alarm.channel in channels
 
     def _all(self, stream: Stream) -> NDArray[np.bool_]:
         return self._wrong[stream] | self._doubted[stream]
@@ -169,8 +169,7 @@ class WiringMonitor:
             if is_wrong and (name not in self._last or (verdict.is_sure and name not in self._sure)):
                 cause = f"{name}.sensor"
                 since = self._last[name].since if name in self._last else self._blocks[0][0]
-                evidence = f"not used; it reads as {likely(verdict)}"
-                self._last[name] = Alarm(name, KIND, since, None, cause, evidence, (Ranked(cause, 1.0, ()),))
+                self._last[name] = Alarm(name, KIND, since, None, cause, likely(verdict), (Ranked(cause, 1.0, ()),))
                 self._sure |= {name} if verdict.is_sure else set()
                 news.append(self._last[name])
         return [*news, *self._ended(end)]

@@ -110,45 +110,60 @@ def _at(chosen: NDArray[np.int64], numbers: NDArray[np.int64], means: Array, rea
     return np.array([mean + middle, np.sqrt(np.maximum(square - mean**2, 0.0) * share)])
 
 
-SPAN = 4.0  # s, span whose mean is removed, so that zeros and slow model errors are no lag
-LONGEST, COARSE = 1.0, 0.05  # s, largest lag of the search, and spacing of the first guesses
+SPAN = 2.0  # s, span whose mean is removed, so that zeros and slow model errors are no lag
+LONGEST, COARSE = 1.0, 0.05  # s, largest lag of the search; spacing of the first guesses, and largest step of Gauss-Newton
+FEWEST = 3.0  # least effective number of moving spans
+CLEAR = 0.4  # largest squared residual with the lag, relative to that without
+FLOOR = 1e-3  # s, standard deviation of a lag by model errors
 
 
 class Lag(NamedTuple):
-    """Lag of a stream and standard deviation, s. `sigma` is infinite if no lag is found."""
+    """Lag of a stream and standard deviation, s. `sigma` is infinite if no lag is found.
+
+    left : squared residual with the lag, relative to that without.
+    """
 
     lag: float
     sigma: float
+    left: float = 1.0
 
 
 def lag_of(stamps: NDArray[np.int64], read: Array, expected: Array) -> Lag:
-    """Return the lag of readings behind expected ones, both (k, channels), at `stamps` (k,) in ns.
-
-    Gauss-Newton starts from the best of several guesses. The scatter among spans gives the deviation.
-    """
-    floor = 1e-3  # s, standard deviation of a lag by model errors
-    clear = 0.5  # largest squared residual with the lag, relative to that without
-    fewest = 3.0  # least effective number of moving spans and channels
-    rounds = 6  # Gauss-Newton steps
+    """Return the lag of readings behind expected ones, both (k, channels), at `stamps` (k,) in ns: near the best guess."""
     times = (stamps - stamps[0]) * NANO
     spans = (times // SPAN).astype(int)
-    off = [_left(times, spans, read, expected, lag)[0] for lag in np.arange(-LONGEST, LONGEST + COARSE, COARSE)]
-    sizes = np.array([np.nansum(each**2, axis=0) for each in off])
-    scale = np.fmax(np.nanmin(sizes, axis=0), 1e-300) / max(len(times), 1)
-    lag = float(np.arange(-LONGEST, LONGEST + COARSE, COARSE)[int((sizes / scale).sum(axis=1).argmin())])
-    before = float((np.nansum(_left(times, spans, read, expected, 0.0)[0] ** 2, axis=0) / scale).sum())
-    for _ in range(rounds):
+    guesses = np.arange(-LONGEST, LONGEST + COARSE, COARSE)
+    sizes = np.array([_sizes(_left(times, spans, read, expected, lag)[0]) for lag in guesses])
+    return lag_near(stamps, read, expected, float(guesses[int((sizes / sizes.min(axis=0)).sum(axis=1).argmin())]))
+
+
+def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, guess: float = 0.0) -> Lag:
+    """Return the lag of readings behind expected ones, as `lag_of`, by Gauss-Newton from a guess (s).
+
+    Each channel counts by what is left of it. The scatter among spans gives the deviation.
+    """
+    times, lag = (stamps - stamps[0]) * NANO, guess
+    spans = (times // SPAN).astype(int)
+    for _ in range(round(LONGEST / COARSE)):
         left, slopes = _left(times, spans, read, expected, lag)
-        by, weight = (_summed(spans, np.nan_to_num(each / scale)) for each in (-left * slopes, slopes**2))
-        if not weight.sum() > 0.0 or weight.sum() ** 2 < fewest * (weight**2).sum():
+        sizes = _sizes(left)
+        by, weight = (_summed(spans, np.nan_to_num(each / sizes)).sum(axis=1) for each in (-left * slopes, slopes**2))
+        if not weight.sum() > 0.0 or weight.sum() ** 2 < FEWEST * (weight**2).sum():
             return Lag(0.0, math.inf)
         change = float(by.sum() / weight.sum())
         lag += min(max(change, -COARSE), COARSE)
-    after = float((np.nansum(left**2, axis=0) / scale).sum())
-    if abs(lag) > LONGEST or (abs(lag) > COARSE and after > clear * before):
+        if abs(change) < 0.1 * FLOOR:
+            break
+    share = left.shape[1] / float((_sizes(_left(times, spans, read, expected, 0.0)[0]) / sizes).sum())
+    if abs(lag) > LONGEST or (abs(lag) > COARSE and share > CLEAR):
         return Lag(0.0, math.inf)
     scatter = math.sqrt(float(((by - change * weight) ** 2).sum())) / float(weight.sum())
-    return Lag(lag, math.hypot(scatter, floor))
+    return Lag(lag, math.hypot(scatter, FLOOR), share)
+
+
+def _sizes(left: Array) -> Array:
+    """Return the sum of squares of each channel, above 0."""
+    return np.asarray(np.nansum(left**2, axis=0) + 1e-300)
 
 
 def _left(times: Array, spans: NDArray[np.int64], read: Array, expected: Array, lag: float) -> tuple[Array, Array]:

@@ -50,7 +50,14 @@ STUCK, RANGE = (alarm_text("joint_1", kind, None) for kind in ("stuck", "range")
         ({}, 2.5, Level.STALE, "no reading", SENSOR),
         ({"stamp": 0}, 2.5, Level.STALE, "no reading yet", SENSOR),
         ({"stamp": 0}, 0.5, Level.OK, "waiting for a reading", SENSOR),
-        ({"stamp": 0}, 99.0, Level.OK, "not there; optional", OPTIONAL),
+        ({"stamp": 0, "missing": nan}, 99.0, Level.OK, "not there; optional", OPTIONAL),
+        (
+            {"stamp": 0, "missing": 1.0},
+            9.0,
+            Level.STALE,
+            "no reading yet; messages without a value",
+            OPTIONAL,
+        ),  # as of another frame
         ({"gap": 0.2}, 0.0, Level.WARN, "gap between readings", SENSOR),
         ({"missing": 0.05}, 0.0, Level.WARN, "messages without a value", SENSOR),
         ({"missing": 0.8}, 0.0, Level.ERROR, "messages without a value", SENSOR),

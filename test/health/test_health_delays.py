@@ -1,9 +1,8 @@
-"""A lag of the stamps of the angles: told with size and deviation, and by no other name."""
+"""Lags of streams: told with size and deviation, by the name of the stream that is late, and by no other name."""
 
 from __future__ import annotations
 
 import math
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import pytest
@@ -11,24 +10,21 @@ import pytest
 from boom_twin import Sample, Stream
 from boom_twin.health.blocks import BLOCK as BLOCK_TIME
 from boom_twin.health.blocks import Block, MeasuredRows
-from boom_twin.health.delay_monitor import DelayMonitor
+from boom_twin.health.lag_monitor import LagMonitor
 from boom_twin.health.stream_readings import StreamReadings, StreamSurvey
-from boom_twin.types import NANO, Alarm, Array
+from boom_twin.types import Alarm, Array
 
 from .recorded import run, session
 
-_SURVEYS: WeakKeyDictionary[object, StreamSurvey] = WeakKeyDictionary()
 RATE, BLOCK = 20, 0.1  # readings of a block, its length in s
 NONE = np.zeros(2, dtype=bool)  # masked channels
 
 
-def block_of(judge: object, raw: Array, expected: Array, number: int) -> StreamReadings:
-    """Return readings (k, channels), evenly in time, for `judge`, whose blocks before it count in the slow means."""
+def block_of(raw: Array, expected: Array, number: int) -> StreamReadings:
+    """Return readings (k, channels), evenly in time."""
     count, channels = raw.shape
-    survey = _SURVEYS.setdefault(judge, StreamSurvey(1.0, channels))
     stamps = number * BLOCK_TIME + np.arange(count) * (BLOCK_TIME // max(count, 1))
-    rows = MeasuredRows(stamps, raw, raw - expected, np.ones(raw.shape))
-    return survey.take(rows, np.zeros(channels, dtype=bool), BLOCK_TIME * NANO)
+    return StreamSurvey(1.0, channels).take(MeasuredRows(stamps, raw, raw - expected, np.ones(raw.shape)), NONE, 0.0)
 
 
 def angles(times: Array) -> Array:
@@ -36,66 +32,84 @@ def angles(times: Array) -> Array:
     return np.stack([0.3 * np.sin(0.4 * times), 0.2 * np.cos(0.31 * times)], axis=1) + 5e-3 * np.sin(6.6 * times)[:, None]
 
 
-def judged(monitor: DelayMonitor, lag: float, seconds: float, first: int = 0, **more: float) -> list[Alarm]:
-    """Return what a monitor tells of readings that are so late (s), with noise and what else is wrong."""
+def judged(monitor: LagMonitor, lag: float, seconds: float, first: int = 0, **more: float) -> list[Alarm]:
+    """Return what a monitor tells of angles that are so late (s), with noise and what else is wrong.
+
+    With `imu`, a second stream is late by that time.
+    """
     rng, news = np.random.default_rng(3), []
+    lags = {Stream.ANGLES: lag} | ({Stream.IMU: more["imu"]} if "imu" in more else {})
     for number in range(first, first + round(seconds / BLOCK)):
-        times = BLOCK * (number + np.arange(RATE) / RATE)
+        times, readings = BLOCK * (number + np.arange(RATE) / RATE), {}
         expected = angles(times)
-        read = angles(times - lag) * more.get("scale", 1.0) + more.get("bias", 0.0) + rng.normal(0.0, 1e-3, expected.shape)
-        read[:, 1] += more.get("lost", 0.0) * math.nan if "lost" in more else 0.0
-        news += monitor.take(block_of(monitor, read, expected, number), NONE, Block(number))
+        for stream, own in lags.items():
+            read = angles(times - own) * more.get("scale", 1.0) + more.get("bias", 0.0) + rng.normal(0.0, 1e-3, (RATE, 2))
+            read[:, 1] += math.nan if "lost" in more else 0.0
+            readings[stream] = block_of(read, expected, number)
+        news += monitor.take(readings, dict.fromkeys(lags, NONE), Block(number))
     return news
 
 
-@pytest.mark.parametrize("lag", [0.12, 0.15, 0.5, 1.0, -0.7])
+def size(alarm: Alarm) -> float:
+    """Return the lag that an alarm states, s."""
+    return 1e-3 * float(alarm.evidence.split()[0])
+
+
+@pytest.mark.parametrize("lag", [0.03, 0.15, 0.5, 0.9])
 def test_a_lag_is_told_with_its_size(lag: float) -> None:
-    (alarm,) = judged(DelayMonitor(), lag, 40.0)
+    (alarm,) = judged(LagMonitor(Stream.STROKES), lag, 60.0)
     assert (alarm.channel, alarm.kind, alarm.cause) == ("joint_angles", "late", "joint_angles.delay")
-    assert float(alarm.evidence.split()[1]) == pytest.approx(lag, abs=0.01)
+    assert size(alarm) == pytest.approx(lag, abs=0.01)
     assert alarm.told == "Stamps of joint angles are late. Correct their delay in the mapping."
 
 
+def test_strokes_are_late_if_all_other_streams_are_early() -> None:
+    """If only the angles are early, these are it."""
+    (strokes,) = judged(LagMonitor(Stream.STROKES), -0.03, 40.0, imu=-0.03)
+    assert (strokes.channel, strokes.cause) == ("cylinder_strokes", "cylinder_strokes.delay")
+    assert size(strokes) == pytest.approx(0.03, abs=0.01)
+    (angles,) = judged(LagMonitor(Stream.STROKES), -0.3, 40.0, imu=0.0)
+    assert angles.channel == "joint_angles" and size(angles) == pytest.approx(-0.3, abs=0.01)
+
+
 @pytest.mark.parametrize(
-    ("lag", "wrong"), [(0.0, {}), (0.05, {}), (0.0, {"bias": 0.02}), (0.0, {"scale": 1.05}), (0.0, {"lost": 1.0})]
+    ("lag", "wrong"), [(0.0, {}), (0.01, {}), (0.0, {"bias": 0.02}), (0.0, {"scale": 1.05}), (0.0, {"lost": 1.0})]
 )
 def test_nothing_else_is_a_lag(lag: float, wrong: dict[str, float]) -> None:
     """Nor a small lag: encoders that read 5 % too much, or so many rad, or one that is silent."""
-    assert judged(DelayMonitor(), lag, 60.0, **wrong) == []
+    assert judged(LagMonitor(Stream.STROKES), lag, 60.0, **wrong) == []
 
 
 def test_a_lag_that_is_taken_back_ends() -> None:
-    monitor = DelayMonitor()
+    monitor = LagMonitor(Stream.STROKES)
     judged(monitor, 0.15, 30.0)
-    assert monitor.alarm is not None
+    assert monitor.is_late(Stream.ANGLES)
     (ended,) = judged(monitor, 0.0, 60.0, first=300)
-    assert ended.until is not None and monitor.alarm is None
+    assert ended.until is not None and monitor.alarms == ()
 
 
 def test_a_lag_that_came_later_is_told_with_its_size() -> None:
-    monitor = DelayMonitor()
+    monitor = LagMonitor(Stream.STROKES)
     assert judged(monitor, 0.0, 60.0) == []
     (alarm,) = judged(monitor, 0.3, 30.0, first=600)
-    assert float(alarm.evidence.split()[1]) == pytest.approx(0.3, abs=0.03)
+    assert size(alarm) == pytest.approx(0.3, abs=0.03)
 
 
 def test_little_evidence_tells_nothing() -> None:
-    """Few spans; or blocks with one reading each, which have no slope; or gaps all the time."""
-    monitor = DelayMonitor()
-    assert judged(monitor, 0.15, 5.7) == []
+    """Two spans; or gaps all the time."""
+    monitor = LagMonitor(Stream.STROKES)
+    assert judged(monitor, 0.15, 4.0) == []
     for number in range(0, 2000, 2):
-        for count in (3, 1):
-            readings = block_of(monitor, np.full((count, 2), 2.0), np.ones((count, 2)), number)
-            assert monitor.take(readings, NONE, Block(number)) == []
+        assert judged(monitor, 0.15, BLOCK, number) == []
 
 
 def test_a_boom_at_rest_has_no_lag() -> None:
     """What is predicted has noise of its own, which readings differ by: no lag makes that go away."""
-    rng, monitor = np.random.default_rng(8), DelayMonitor()
+    rng, monitor = np.random.default_rng(8), LagMonitor(Stream.STROKES)
     for number in range(1000):
         expected = 1.0 + np.cumsum(rng.normal(0.0, 1e-5, (RATE, 2)), axis=0)
-        read = 1.0 + rng.normal(0.0, 2e-4, (RATE, 2))
-        assert monitor.take(block_of(monitor, read, expected, number), NONE, Block(number)) == []
+        readings = {Stream.ANGLES: block_of(1.0 + rng.normal(0.0, 2e-4, (RATE, 2)), expected, number)}
+        assert monitor.take(readings, {Stream.ANGLES: NONE}, Block(number)) == []
 
 
 def late(seconds: float, lag: float) -> tuple[Sample, ...]:

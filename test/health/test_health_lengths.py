@@ -57,7 +57,7 @@ def test_a_channel_that_is_off_is_told_in_its_unit_and_ends(name: str) -> None:
     assert {(alarm.channel, alarm.kind, alarm.cause) for alarm in found} == {(name, "deviation", None)}
     since, until = ((stamp - 10**18) * 1e-9 for stamp in (found[0].since, found[-1].until))
     assert 3.0 <= since < 8.0 and 9.0 <= until < 18.0  # a mean over 2 s falls from 52 mm to half of 5 mm in 6 s
-    assert found[0].evidence.startswith("by +") and found[0].ranked == ()
+    assert found[0].evidence.startswith("+") and found[0].ranked == ()
 
 
 def test_a_stroke_transducer_that_is_off_shows_in_its_joint() -> None:
@@ -81,7 +81,7 @@ def test_a_load_at_the_tip_above_its_limit_is_told_and_ends() -> None:
         news += monitor.take(k * 100_000_000, np.array([by_lengths, [0.0, -size]]), np.array([[1e6, 1e4], [1e4, 2500.0]]))
     began, ended = news
     assert (began.channel, began.cause, began.since, began.until) == ("tip", "tip.load", 5_000_000_000, None)
-    assert "900 N (+- 50)" in began.evidence and ended.until == 8_500_000_000 and monitor.alarm is None
+    assert "+900 N (+- 50), tip_load_limit" in began.evidence and ended.until == 8_500_000_000 and monitor.alarm is None
 
 
 def test_a_load_that_lengths_contradict_is_no_load() -> None:

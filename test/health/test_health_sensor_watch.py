@@ -8,7 +8,7 @@ import numpy as np
 
 from boom_twin import Stream
 from boom_twin.health.sensor_check import SensorCheck, SensorFindings
-from boom_twin.health.sensor_monitor import SETTLED, SensorMonitor
+from boom_twin.health.sensor_monitor import AGAIN, SETTLED, SensorMonitor
 from boom_twin.texts import alarm_text
 from boom_twin.types import SENSORS
 
@@ -67,7 +67,7 @@ def test_nothing_is_found_of_a_sensor_that_is_not_there():
 def test_a_jump_lasts_until_it_jumps_back():
     watched = Watched()
     (began,) = watched.take(findings(0, "jump", 0.01))
-    assert began.evidence == "by +0.573 deg" and watched.watch.masked.tolist() == [True, False]
+    assert began.evidence == "+0.573 deg" and watched.watch.masked.tolist() == [True, False]
     assert watched.rest(5 * SETTLED) == [] and watched.watch.masked[0]
     assert watched.take(findings(0, "jump", 0.02)) == [], "further away"
     watched.rest(SETTLED)
@@ -122,3 +122,21 @@ def test_a_jump_from_one_reading_to_the_next_is_found_and_none_across_a_gap():
     """While nothing came the boom may have moved, and the model did not see it."""
     assert abs(jumped_after_a_pause(0.005) - 0.1) < 2e-3
     assert jumped_after_a_pause(4.0) == 0.0
+
+
+def test_an_intermittent_contact_is_one_alarm_with_a_count():
+    """A sensor that fails again within a minute; of its further failures no other alarm is told. It ends after a minute."""
+    watched, told = Watched(), []
+    for kind in ["dropout", "range", "dropout", "stuck"]:
+        told += watched.take(findings(0, kind)) + watched.take(findings(0, "noise"))
+        assert watched.watch.masked[0]
+        told += watched.rest(5 * SETTLED)
+        assert not watched.watch.masked.any()
+    again = [alarm for alarm in told if alarm.kind == "intermittent"]
+    assert {(alarm.kind, alarm.since) for alarm in told if alarm not in again} == {("dropout", 0), ("noise", BLOCK)}
+    assert [alarm.evidence.partition("x")[0] for alarm in again] == ["2", "3", "4"] and len(
+        {alarm.since for alarm in again}
+    ) == 1
+    assert watched.watch.alarms == (again[-1],)
+    (ended,) = watched.rest(AGAIN)
+    assert ended.kind == "intermittent" and ended.until is not None and watched.watch.alarms == ()

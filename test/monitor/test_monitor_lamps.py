@@ -69,7 +69,7 @@ def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
     judge(alarms, 3.0, unknown)
     (found,) = alarms.all
     assert (found.name, found.reason, found.begin) == ("joint_2", unknown.told, 2.0)
-    assert found.evidence == "cannot be told apart; a.k possible, b.k possible" and set(found.words) == {"en", "de", "zh"}
+    assert found.evidence == "cannot be told apart; a.k 60 %, b.k 40 %" and set(found.words) == {"en", "de", "zh"}
     assert found.causes == (("a.k", 0.6), ("b.k", 0.4))
     assert alarms.acknowledge(found.number) is found
     judge(alarms, 4.0, unknown)

@@ -253,7 +253,7 @@ class AlarmList:
     def add_gap(self, channel: str, begin: float, end: float) -> None:
         """Add a gap between two stamps of a channel."""
         alarm = self.add(channel, Severity.WARN, alarm_text(channel, "gap", None), begin, end)
-        alarm.words, alarm.evidence, alarm.fault = _words(channel, "gap", None), f"for {end - begin:.2f} s", "gap"
+        alarm.words, alarm.evidence, alarm.fault = _words(channel, "gap", None), f"{end - begin:.2f} s", "gap"
 
     def add(self, name: str, level: Severity, reason: str, begin: float, end: float | None = None) -> ListedAlarm:
         """Add an alarm, with its end (s) if it is over, such as a gap."""

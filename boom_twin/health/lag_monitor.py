@@ -1,0 +1,100 @@
+"""Monitor of the lags of all streams behind the strokes, by the estimator of the commissioning check.
+
+A lag is reported if it explains most of what readings are off the prediction, and its size is known to a tenth. If all other
+streams are early by the same time, the strokes are late.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types import SENSORS, Alarm, Array, Stream
+from ..wiring.readings import CLEAR, Lag, lag_near
+from .alarms import change_text
+from .blocks import Block
+from .stream_readings import StreamReadings
+
+LEAST = 0.025  # s, lag from which on it is an alarm: a payload or a spring that is wrong shifts vibration by less
+SIGMAS = 10.0  # standard deviations that a lag has at least: before it has been so for a while its size is a mixture
+EVERY, WINDOWS = 20, (300, 150, 75)  # blocks between two estimates, and of each: shorter ones see a lag that is new
+
+
+class LagMonitor:
+    """Monitor of the stamps of all streams.
+
+    Parameters
+    ----------
+    drive : Stream
+        Quantity that drives the model, which lags are against.
+    """
+
+    def __init__(self, drive: Stream) -> None:
+        self._drive, self._alarms = drive, dict[Stream, Alarm]()
+        self.begin()
+
+    def begin(self) -> None:
+        """Discard all readings, because the boom restarts at rest; alarms last until lags are known to be small."""
+        self._number = 0
+        self._means: dict[Stream, deque[tuple[int, Array, Array]]] = {}  # stamp (ns), readings, expected ones of each block
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Alarms that last."""
+        return tuple(self._alarms.values())
+
+    def is_late(self, stream: Stream) -> bool:
+        """Return True if the stream and the strokes are known to be of different times."""
+        return stream in self._alarms or self._drive in self._alarms
+
+    def take(
+        self, readings: Mapping[Stream, StreamReadings], failing: Mapping[Stream, NDArray[np.bool_]], block: Block
+    ) -> list[Alarm]:
+        """Take a block without the channels of failing sensors; return the alarms that began or ended."""
+        if block.number != self._number + 1:
+            self._means.clear()
+        self._number = block.number
+        for stream, (rows, *_) in readings.items():
+            if len(rows.stamps) and not SENSORS[stream].beside:
+                read = np.where(failing[stream], np.nan, rows.raw.mean(axis=0))
+                means = int(rows.stamps.mean()), read, read - rows.left.mean(axis=0)
+                self._means.setdefault(stream, deque(maxlen=WINDOWS[0])).append(means)
+        return [] if block.number % EVERY else self._judge(block.end)
+
+    def _judge(self, end: int) -> list[Alarm]:
+        """Begin and end alarms by the present lags."""
+        lags = {stream: _lag(means) for stream, means in self._means.items()}
+        late = {stream: lag for stream, lag in lags.items() if lag.left < CLEAR and _exceeds(lag)}
+        if late and max(late.values()).lag < 0.0:
+            surest = min(late.values(), key=lambda lag: lag.sigma)
+            if not any(_exceeds(lag._replace(lag=lag.lag - surest.lag)) for lag in lags.values()):
+                late = {self._drive: surest._replace(lag=-surest.lag)}
+        near = {stream for stream, lag in lags.items() if abs(lag.lag) + SIGMAS * lag.sigma < LEAST}
+        near |= {self._drive} if near == lags.keys() else set()
+        news = [replace(self._alarms.pop(stream), until=end) for stream in list(self._alarms) if stream in near]
+        for stream, lag in late.items():
+            if stream not in self._alarms:
+                name, evidence = stream.value, change_text(1e3 * lag.lag, "ms", 1e3 * lag.sigma)
+                self._alarms[stream] = Alarm(name, "late", end, None, f"{name}.delay", evidence)
+                news.append(self._alarms[stream])
+        return news
+
+
+def _exceeds(lag: Lag) -> bool:
+    return abs(lag.lag) > max(LEAST, SIGMAS * lag.sigma)
+
+
+def _lag(means: deque[tuple[int, Array, Array]]) -> Lag:
+    """Return the lag of the window that a lag explains best, by the channels with all readings."""
+    stamps, *columns = map(np.array, zip(*means, strict=True))
+    found = list[Lag]()
+    for count in WINDOWS:
+        read, expected = (each[-count:] for each in columns)
+        is_whole = np.isfinite(read + expected).all(axis=0)
+        if is_whole.any():
+            found.append(lag_near(stamps[-count:], read[:, is_whole], expected[:, is_whole]))
+    return min(found, key=lambda lag: (lag.left, lag.sigma), default=Lag(0.0, np.inf))
