@@ -24,21 +24,25 @@ def copy_model(f, source, target, size):
 @inner
 def models_of(mixture):
     """Return the first model of a mixture, and how many it has."""
-    return (VALVES, 3) if mixture == PREDICTION else (ALL_VALVES, 2)
+    return (VALVES, ALL_VALVES - VALVES) if mixture == PREDICTION else (ALL_VALVES, 4)
 
 
 @inner
 def interact(f, mixture, size, h):
-    """Mix the models of a mixture before a step of `h` (s), by the rates at which valves and load change."""
+    """Mix the models of a mixture before a step of `h` (s): valves and load change independently of each other.
+
+    Without a model of open valves under a new load, one in which all are open stands for it.
+    """
     first, count = models_of(mixture)
-    opens, closes = 1.0 - math.exp(-OPENS * h), 1.0 - math.exp(-CLOSES * h)
-    comes, stays = 1.0 - math.exp(-COMES * h), 1.0 - math.exp(-STAYS * h)
-    if count == 2:
-        comes = 0.0
     switch = f.switch
-    switch[VALVES, VALVES], switch[VALVES, OPEN], switch[VALVES, BURST] = 1.0 - opens - comes, opens, comes
-    switch[OPEN, VALVES], switch[OPEN, OPEN], switch[OPEN, BURST] = closes, 1.0 - closes, 0.0
-    switch[BURST, VALVES], switch[BURST, OPEN], switch[BURST, BURST] = stays, opens, 1.0 - stays - opens
+    for source in range(count):
+        clear(switch[source], count)
+        turns = 1.0 - math.exp(-(CLOSES if source % 2 == OPEN else OPENS) * h)
+        changes = 1.0 - math.exp(-(STAYS if source >= BURST else COMES) * h)
+        for target in range(4):
+            valves = 1.0 - turns if source % 2 == target % 2 else turns
+            load = 1.0 - changes if source // 2 == target // 2 else changes
+            switch[source, target if target < count else OPEN] += valves * load
     for target in range(count):
         new = 0.0
         for source in range(count):
