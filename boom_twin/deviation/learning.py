@@ -7,7 +7,21 @@ import math
 from ..kernels.jit import inner
 from .kalman import DRIVE_TIME
 from .mixture import copy_model
-from .states import ALL_OPEN, ALL_VALVES, BURST, ESTIMATE, FED, OPEN, PREDICTION, VALVES, all_states, drive_place, force_place
+from .states import (
+    ALL_BURST,
+    ALL_OPEN,
+    ALL_OPEN_BURST,
+    ALL_VALVES,
+    BURST,
+    ESTIMATE,
+    FED,
+    OPEN,
+    PREDICTION,
+    VALVES,
+    all_states,
+    drive_place,
+    force_place,
+)
 
 LEARN_LOAD = 3.0  # s, in which the variance of the fast load is learnt
 SURPRISE = 9.0  # largest square of a value that counts in the learnt variance, in terms of the present variance
@@ -39,6 +53,7 @@ def watch_valves(p, f, h, size):
         copy_model(f, OPEN, BURST, size)
         if f.status[FED] == 1:
             copy_model(f, ALL_OPEN, ALL_VALVES, all_states(p))
+            copy_model(f, ALL_OPEN_BURST, ALL_BURST, all_states(p))
 
 
 @inner

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner
+from .rows import clear
 from .states import ALL_VALVES, BURST, OPEN, PREDICTION, VALVES
 
 OPENS, CLOSES = 0.3, 1.0  # 1/s, rates at which valves open, and are closed again
@@ -23,21 +24,25 @@ def copy_model(f, source, target, size):
 @inner
 def models_of(mixture):
     """Return the first model of a mixture, and how many it has."""
-    return (VALVES, 3) if mixture == PREDICTION else (ALL_VALVES, 2)
+    return (VALVES, ALL_VALVES - VALVES) if mixture == PREDICTION else (ALL_VALVES, 4)
 
 
 @inner
 def interact(f, mixture, size, h):
-    """Mix the models of a mixture before a step of `h` (s), by the rates at which valves and load change."""
+    """Mix the models of a mixture before a step of `h` (s): valves and load change independently of each other.
+
+    Without a model of open valves under a new load, one in which all are open stands for it.
+    """
     first, count = models_of(mixture)
-    opens, closes = 1.0 - math.exp(-OPENS * h), 1.0 - math.exp(-CLOSES * h)
-    comes, stays = 1.0 - math.exp(-COMES * h), 1.0 - math.exp(-STAYS * h)
-    if count == 2:
-        comes = 0.0
     switch = f.switch
-    switch[VALVES, VALVES], switch[VALVES, OPEN], switch[VALVES, BURST] = 1.0 - opens - comes, opens, comes
-    switch[OPEN, VALVES], switch[OPEN, OPEN], switch[OPEN, BURST] = closes, 1.0 - closes, 0.0
-    switch[BURST, VALVES], switch[BURST, OPEN], switch[BURST, BURST] = stays, opens, 1.0 - stays - opens
+    for source in range(count):
+        clear(switch[source], count)
+        turns = 1.0 - math.exp(-(CLOSES if source % 2 == OPEN else OPENS) * h)
+        changes = 1.0 - math.exp(-(STAYS if source >= BURST else COMES) * h)
+        for target in range(4):
+            valves = 1.0 - turns if source % 2 == target % 2 else turns
+            load = 1.0 - changes if source // 2 == target // 2 else changes
+            switch[source, target if target < count else OPEN] += valves * load
     for target in range(count):
         new = 0.0
         for source in range(count):
@@ -56,21 +61,26 @@ def interact(f, mixture, size, h):
 
 @inner
 def blend(f, first, count, mean, spread, size):
-    """Write mean and covariance of `count` models (2 or 3) with the probabilities `f.shares`."""
-    one, two, three = f.shares[0], f.shares[1], f.shares[2]
-    x, y, z = f.x[first], f.x[first + 1], f.x[first + count - 1]
-    if count == 2:
-        three = 0.0
+    """Write mean and covariance of `count` models with the probabilities `f.shares`, two models at a time."""
+    clear(mean, size)
+    for k in range(count):
+        for i in range(size):
+            mean[i] += f.shares[k] * f.x[first + k, i]
     for i in range(size):
-        mean[i] = one * x[i] + two * y[i] + three * z[i]
-    for i in range(size):
-        to_x, to_y, to_z = one * (x[i] - mean[i]), two * (y[i] - mean[i]), three * (z[i] - mean[i])
-        line, by_x, by_y, by_z = spread[i], f.p[first, i], f.p[first + 1, i], f.p[first + count - 1, i]
-        for k in range(size):
-            line[k] = one * by_x[k] + two * by_y[k] + to_x * (x[k] - mean[k]) + to_y * (y[k] - mean[k])
-        if three > 1e-12:
-            for k in range(size):
-                line[k] += three * by_z[k] + to_z * (z[k] - mean[k])
+        line = spread[i]
+        for k in range(0, count, 2):
+            other = min(k + 1, count - 1)
+            one, two = f.shares[k], f.shares[other] if other > k else 0.0
+            if k > 0 and one + two < 1e-12:
+                continue
+            x, y, by_x, by_y = f.x[first + k], f.x[first + other], f.p[first + k, i], f.p[first + other, i]
+            to_x, to_y = one * (x[i] - mean[i]), two * (y[i] - mean[i])
+            if k == 0:
+                for j in range(size):
+                    line[j] = one * by_x[j] + two * by_y[j] + to_x * (x[j] - mean[j]) + to_y * (y[j] - mean[j])
+            else:
+                for j in range(size):
+                    line[j] += one * by_x[j] + two * by_y[j] + to_x * (x[j] - mean[j]) + to_y * (y[j] - mean[j])
 
 
 @inner

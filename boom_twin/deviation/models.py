@@ -17,7 +17,8 @@ estimate adds zeros of IMU, angle sensors and force sensors, and errors of furth
 A closed valve locks the oil, so its drive stands still: that is a reading of rate zero. Three models interact (H. Blom and
 Y. Bar-Shalom, IEEE Trans. Automat. Control 33 (1988), 780-783): valves as they are believed to be; all valves open; valves as
 believed under a load that has just come. Where the second explains the lengths best, valves whose rates differ from zero are
-believed open, until they stand still. The estimate has the first two, each with the readings of all sensors.
+believed open, until they stand still. The estimate has the readings of all sensors in each, and a fourth: open valves under a
+load that has just come. Lengths alone do not tell these two apart where both begin at once.
 
 How far a drive's acceleration changes, and how large the fast load is, is learnt: the variance that a state is expected to have
 goes to the one that it shows (expectation maximisation, one step a sample).
@@ -34,7 +35,7 @@ from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
 from .mixture import copy_model, interact, mix, models_of, weigh_models
 from .rows import SWAY_SHARE, clear, column_row, drive_row, read, variance_of
 from .states import (
-    ALL_OPEN,
+    ALL_OPEN_BURST,
     ALL_VALVES,
     BURST,
     ESTIMATE,
@@ -119,12 +120,12 @@ def step_models(p, f, h, y):
             for mixture in range(mixtures):
                 first, count = models_of(mixture)
                 for k in range(first, first + count):
-                    burst = f.chances[BURST] if mixture == ESTIMATE else 1.0 if k == BURST else 0.0
-                    transit(p, f, k, states_of(p, mixture), h / steps, f.load2[mixture], burst * burst2)
+                    least2 = burst2 if k - first >= BURST else 0.0
+                    transit(p, f, k, states_of(p, mixture), h / steps, f.load2[mixture], least2)
         for mixture in range(mixtures):
             first, count = models_of(mixture)
             for k in range(first, first + count):
-                if k != OPEN and k != ALL_OPEN:
+                if (k - first) % 2 != OPEN:
                     hold_still(p, f, k, states_of(p, mixture))
     note_innovations(p, f, y)
     evidence = 0.0
@@ -220,16 +221,17 @@ def follow_prediction(p, f):
     """Set the estimate to the prediction; the sensors' zeros are unknown then."""
     p.delayed[0] = 0
     size, every, n = zero_place(p), all_states(p), p.drives.shape[0]
-    for k in range(2):
+    for k in range(ALL_VALVES, ALL_OPEN_BURST + 1):
+        source = OPEN if k == ALL_OPEN_BURST else k - ALL_VALVES
+        f.chances[k] = 0.0 if k == ALL_OPEN_BURST else f.chances[source]
         for i in range(every):
-            f.x[ALL_VALVES + k, i] = f.mean[PREDICTION, i] if i < size else 0.0
+            f.x[k, i] = f.x[source, i] if i < size else 0.0
             for j in range(every):
-                f.p[ALL_VALVES + k, i, j] = f.spread[PREDICTION, i, j] if i < size and j < size else 0.0
-        covariance = f.p[ALL_VALVES + k]
+                f.p[k, i, j] = f.p[source, i, j] if i < size and j < size else 0.0
+        covariance = f.p[k]
         for a in range(2):
             covariance[size + a, size + a] = IMU_ZERO * IMU_ZERO
         for i in range(n):
             covariance[size + 4 + i, size + 4 + i] = ANGLE_ZERO * ANGLE_ZERO
         free_sensors(p, f, covariance)
-    f.chances[ALL_VALVES], f.chances[ALL_OPEN] = f.chances[VALVES] + f.chances[BURST], f.chances[OPEN]
     mix(f, ESTIMATE, every)

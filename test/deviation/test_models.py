@@ -9,11 +9,11 @@ from scipy.linalg import expm
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
 from boom_twin.deviation.kalman import DRIVE_TIME, FAST, SLOW, correct, make_transition, transit
-from boom_twin.deviation.mixture import mix
+from boom_twin.deviation.mixture import CLOSES, COMES, OPENS, STAYS, interact, mix, models_of
 from boom_twin.deviation.posture import Posture
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.deviation.rows import length_row
-from boom_twin.deviation.states import ALL_VALVES, LOADS, PREDICTION, Filters, all_states, zero_place
+from boom_twin.deviation.states import ALL_VALVES, ESTIMATE, LOADS, OPEN, PREDICTION, Filters, all_states, zero_place
 from boom_twin.types import Array
 
 SCENE = load_scene()
@@ -110,6 +110,30 @@ def test_mixture_has_mean_and_covariance_of_its_models(boom: BoomPredictor) -> N
     spread = np.einsum("k,kij->ij", chances, f.p[:3, :size, :size]) + np.einsum("k,ki,kj->ij", chances, apart, apart)
     assert f.mean[PREDICTION, :size] == pytest.approx(mean)
     assert f.spread[PREDICTION, :size, :size] == pytest.approx(spread)
+    boom.start(REST.lengths)
+
+
+@pytest.mark.parametrize(("mixture", "merged"), [(PREDICTION, True), (ESTIMATE, False)])
+def test_valves_and_load_change_independently_of_each_other(mixture: int, merged: bool, boom: BoomPredictor) -> None:
+    """Probabilities after a step are the product of two Markov chains of two states; open valves have one model or two."""
+    f, h, valves, load = boom.filters, 0.02, np.array([0.7, 0.3]), np.array([0.6, 0.4])
+    first, count = models_of.py_func(mixture)
+    before, after = (
+        np.outer(*chains).ravel()
+        for chains in (
+            (load, valves),
+            [
+                chances @ expm(h * np.array([[-up, up], [down, -down]]))
+                for chances, up, down in ((load, COMES, STAYS), (valves, OPENS, CLOSES))
+            ],
+        )
+    )
+    for each in (before, after) if merged else ():
+        each[OPEN] += each[3]
+    f.chances[first : first + count] = before[:count]
+    interact.py_func(f, mixture, 7, h)
+    assert f.chances[first : first + count] == pytest.approx(after[:count], abs=5e-3 if merged else 1e-4)
+    assert f.chances[first : first + count].sum() == pytest.approx(1.0)
     boom.start(REST.lengths)
 
 

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from drive_twin import PUMP_DRIVES
 from recordings import load_truth, scan
+from session_readings import samples_in
 
-from boom_twin import replay
+from boom_twin import Stream, Twin, load_scene, replay
+from boom_twin.twin.blocks import block_of
 
 SESSION = Path(__file__).parents[2] / "bags" / "pump_session"
 SESSIONS = {"lengths": SESSION, "drives": PUMP_DRIVES}
@@ -33,6 +35,21 @@ def test_its_truth_has_the_load(kind):
     power = np.abs(np.fft.rfft(pump[begun] - pump[begun].mean())) ** 2
     assert np.fft.rfftfreq(begun.sum(), 0.005)[power.argmax()] == pytest.approx(0.43, abs=0.02)
     assert 7.0 < wind[begun].std() < 25.0
+
+
+@pytest.mark.parametrize("more", [(Stream.IMU,), (Stream.ANGLES, Stream.IMU)])
+def test_an_imu_makes_no_estimate_worse(more):
+    """The pump begins at 5 s. What the IMU adds must not be taken for valves that open."""
+    truth, found = load_truth(SESSION), []
+    for streams in ((Stream.STROKES,), (Stream.STROKES, *more)):
+        estimates = Twin(load_scene()).take(block_of(samples_in(SESSION, streams, 15.0), 4)).estimates
+        times = (estimates.stamps - estimates.stamps[0]) * 1e-9 + truth.times[0]
+        off = (estimates.tip[:, :2] - truth.at(times, truth.position))[times > QUIET]
+        normalised = off / np.sqrt(estimates.tip_covariance[times > QUIET][:, [0, 3]])
+        found.append((np.sqrt(np.mean(off**2)), np.sqrt(np.mean(normalised**2))))
+    (alone, _), (with_imu, normalised) = found
+    assert with_imu < 1.05 * alone
+    assert normalised < 1.6
 
 
 def test_tip_and_load_are_estimated_with_true_deviations(kind, tmp_path):
