@@ -39,12 +39,13 @@ class ReadingsWork(NamedTuple):
     """State of `summarise` for one stream.
 
     stated : variance of the noise.
-    counts : (channels,) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
+    counts, means : (channels,), (2, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
     slow : SlowMeans.
     """
 
     stated: float
     counts: Array
+    means: Array
     slow: SlowMeans
 
 
@@ -277,7 +278,7 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
     share : float
         Weight of the block in the slow means.
     """
-    counts, slow, last = work.counts, work.slow, stamps.shape[0] - 1
+    counts, means, slow, last = work.counts, work.means, work.slow, stamps.shape[0] - 1
     span = (stamps[last] - stamps[0]) * NANO
     for i in range(raw.shape[1]):
         known, read, off, variance = 0, 0.0, 0.0, 0.0
@@ -287,14 +288,16 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
                 read += raw[t, i]
                 off += left[t, i]
                 variance += sigmas[t, i] * sigmas[t, i]
-        counts[i] = known
+        counts[i], means[:, i] = known, math.nan
+        if known > 0:
+            means[0, i], means[1, i] = read / known, (read - off) / known
         rate = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span if span > 0.0 else math.nan
         if masked[i]:
             for each in (slow.read, slow.expected, slow.variance, slow.rate, slow.weight):
                 each[i] = 0.0
         elif known > 0:
-            slow.read[i] += share * (read / known - slow.read[i])
-            slow.expected[i] += share * ((read - off) / known - slow.expected[i])
+            slow.read[i] += share * (means[0, i] - slow.read[i])
+            slow.expected[i] += share * (means[1, i] - slow.expected[i])
             slow.variance[i] += share * (variance / known - slow.variance[i])
             slow.weight[i] += share * (1.0 - slow.weight[i])
         if math.isfinite(rate) and not masked[i]:
