@@ -13,15 +13,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import SENSORS, Alarm, Array, Stream
-from ..wiring.readings import CLEAR, Lag, lag_near
+from ..types import NANO, SENSORS, Alarm, Array, Stream
+from ..wiring.readings import CLEAR, SPAN, Lag, lag_near
 from .alarms import change_text
-from .blocks import Block
+from .blocks import BLOCK, Block
 from .stream_readings import StreamReadings
 
 LEAST = 0.025  # s, lag from which on it is an alarm: a payload or a spring that is wrong shifts vibration by less
 SIGMAS = 10.0  # standard deviations that a lag has at least: before it has been so for a while its size is a mixture
-EVERY, WINDOWS = 30, (300, 150, 75)  # blocks between two estimates, and of each: shorter ones see a lag that is new
+EVERY = round(SPAN / (BLOCK * NANO))  # blocks between two estimates
+WINDOWS = 12 * EVERY, 6 * EVERY, 3 * EVERY  # blocks of each: shorter ones see a lag that is new
 
 
 class LagMonitor:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..kernels.jit import SameTypes, hold
 from ..scene.schema import Scene
 from ..types import GIVE, Array, Mount, Stream, channels_of
+from .sensor_findings import FALSE_ALARM, OUTLIER, OUTSIDE, SILENT, SPIKES, STUCK, find
 from .sensor_findings import NOISY as IS_NOISY
-from .sensor_findings import OUTSIDE, SILENT, SPIKE, SPIKES, STUCK, find
 from .sensor_survey import LATELY, ROOM, CheckLimits, CheckWork, survey
 
 
@@ -56,7 +56,6 @@ USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
 NOISE_OVER = "noise_over_"  # and the name of a setting: how its figures are called
 MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
 REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to repeat
-FALSE_ALARM = 1e-12  # probability, for each reading, that a live sensor repeats for so long
 SILENT_FOR = 0.5  # s; readings that lie farther apart are no neighbours: neither jumps nor spikes show across such a gap
 MISSING = 0.1  # share of the readings
 
@@ -132,7 +131,7 @@ class SensorCheck:
         margin, stated2 = 5.0 * self._sigma, self._sigma**2
         limits = CheckLimits(
             gap=SILENT_FOR, cut=(4.0 * NOISY) ** 2 * stated2, stated=stated2, window=NOISY_WINDOW, long_window=USUAL_WINDOW,
-            leap=SPIKE * self._sigma, loud=NOISY**2, loudest_usual=NOISY**2 * stated2, lack=MISSING,
+            leap=OUTLIER * self._sigma, loud=NOISY**2, loudest_usual=NOISY**2 * stated2, lack=MISSING,
             patience=repeats(sigma, resolution),
         )  # fmt: skip
         self._known = CheckWork(
@@ -176,20 +175,8 @@ class SensorCheck:
         if not rows:
             return self._calm if self._known.lately["first"][0] == math.inf else self._nothing(raw.shape[1], now)
         self._make_room(3 + rows)
-        is_calm, largest = self._survey(self._held, stamps, np.ascontiguousarray(raw), np.ascontiguousarray(expected), now)
-        return self._calm if is_calm else self._findings(largest, rows, now)
-
-    def _make_room(self, rows: int) -> None:
-        """Make room for `rows` readings, including the newest three before the block."""
         known = self._known
-        if rows > len(known.times):
-            times, raw, left = (np.resize(each, (2 * rows, *each.shape[1:])) for each in (known.times, known.raw, known.left))
-            self._known, self._column = known._replace(times=times, raw=raw, left=left), np.zeros(2 * rows)
-            self._held = hold(self._known)
-
-    def _findings(self, largest: float, rows: int, now: float) -> SensorFindings:
-        """Return the findings in so many readings, whose largest step is `largest`."""
-        known = self._known
+        largest = self._survey(self._held, stamps, np.ascontiguousarray(raw), np.ascontiguousarray(expected))
         interval = (known.times[2 + rows] - known.times[2]) / rows
         is_motion = self._fastest > 0.0 and JERK * interval**3 > NOISY * self._sigma  # what bends readings so much
         is_known = bool(now - known.lately["first"][0] > NOISY_WINDOW and not is_motion)  # how noisy the sensors are
@@ -199,6 +186,14 @@ class SensorCheck:
         return SensorFindings(
             flags[STUCK], flags[IS_NOISY], flags[SPIKES], jumped, flags[SILENT], flags[OUTSIDE], known.left[2 + rows].copy()
         )
+
+    def _make_room(self, rows: int) -> None:
+        """Make room for `rows` readings, including the newest three before the block."""
+        known = self._known
+        if rows > len(known.times):
+            times, raw, left = (np.resize(each, (2 * rows, *each.shape[1:])) for each in (known.times, known.raw, known.left))
+            self._known, self._column = known._replace(times=times, raw=raw, left=left), np.zeros(2 * rows)
+            self._held = hold(self._known)
 
     def _nothing(self, count: int, now: float) -> SensorFindings:
         none, silent = np.zeros(count, dtype=bool), now - self._known.heard > SILENT_FOR

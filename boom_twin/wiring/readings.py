@@ -112,7 +112,7 @@ def _at(chosen: NDArray[np.int64], numbers: NDArray[np.int64], means: Array, rea
 
 SPAN = 2.0  # s, span whose mean is removed, so that zeros and slow model errors are no lag
 LONGEST, COARSE = 1.0, 0.05  # s, largest lag of the search; spacing of the first guesses, and largest step of Gauss-Newton
-FEWEST = 3.0  # least effective number of moving spans
+FEWEST = 2.0  # least effective number of moving spans
 CLEAR = 0.4  # largest squared residual with the lag, relative to that without
 FLOOR = 1e-3  # s, standard deviation of a lag by model errors
 
@@ -143,8 +143,9 @@ def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, guess: flo
     if (stamps[-1] - stamps[0]) * NANO < FEWEST * SPAN:
         return Lag(0.0, math.inf)
     residuals, lag = _Residuals(stamps, read, expected), guess
-    for _ in range(round(LONGEST / COARSE)):
-        left, slopes = residuals.left(lag)
+    at_zero = residuals.left(0.0)
+    for _ in range(round(2.0 * LONGEST / COARSE)):
+        left, slopes = at_zero if lag == 0.0 else residuals.left(lag)
         sizes = _sizes(left)
         by, weight = (residuals.summed(np.nan_to_num(each / sizes)).sum(axis=1) for each in (-left * slopes, slopes**2))
         if not weight.sum() > 0.0 or weight.sum() ** 2 < FEWEST * (weight**2).sum():
@@ -153,7 +154,9 @@ def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, guess: flo
         lag += min(max(change, -COARSE), COARSE)
         if abs(change) < FLOOR:
             break
-    share = left.shape[1] / float((_sizes(residuals.left(0.0)[0]) / sizes).sum())
+    else:
+        return Lag(0.0, math.inf)
+    share = left.shape[1] / float((_sizes(at_zero[0]) / sizes).sum())
     if abs(lag) > LONGEST or (abs(lag) > COARSE and share > CLEAR):
         return Lag(0.0, math.inf)
     scatter = math.sqrt(float(((by - change * weight) ** 2).sum())) / float(weight.sum())
