@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ..types import Array, Stream
 
-BLOCK = 100_000_000  # ns
-GRACE = 100_000_000  # ns that a block waits for late samples
+BLOCK = 100_000_000  # ns; a block waits as long for late samples
 
 
 class PredictionRows(NamedTuple):
@@ -129,7 +128,7 @@ class BlockBuilder:
     def close(self, stamp: int) -> list[Block]:
         """Return blocks for which no sample is awaited once a stroke has come with `stamp` (ns); they may be empty."""
         done = []
-        while self._open and self._open[0].end + GRACE <= stamp:
+        while self._open and self._open[0].end + BLOCK <= stamp:
             done.append(self._open.popleft())
             self._closed = done[-1].number
         return done

@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import SENSORS, Alarm, Array, Stream, channels_of
+from ..types import NANO, SENSORS, Alarm, Array, Stream, channels_of
+from ..wiring.readings import LONGEST
 from .alarms import change_text
 from .blocks import Block
-from .stream_readings import ENOUGH, StreamReadings
+from .stream_readings import ENOUGH, WINDOW, StreamReadings
 
 KIND = "deviation"  # kind of all its alarms
 SIGMAS = {Stream.ANGLES: 3.0, Stream.FORCES: 10.0}
 """Standard deviations that a mean residual has to exceed, beside its limit. Deviations of forces lack the model error."""
-LAG = 0.4  # s; a residual explained by a smaller delay of stamps is no deviation, see `lag_monitor`
-LASTING = 3_000_000_000  # ns, debounce time: in fast motion a mean is off for two seconds
+LASTING = round(1.5 * WINDOW / NANO)  # ns, debounce time: in fast motion a mean is off for as long as it is taken over
 GONE = 0.5  # share of the limit below which a deviation ends
-SETTLED = 5_000_000_000  # ns below that share before it ends
+SETTLED = round(3.0 * WINDOW / NANO)  # ns below that share before it ends: a mean forgets all but 5 %
 
 
 @dataclass
@@ -64,9 +64,8 @@ class DeviationMonitor:
             return []
         is_known = (readings.counts > 0.0) & (slow.weight > ENOUGH) & ~masked
         least = np.maximum(self._limits, SIGMAS[self._stream] * np.sqrt(slow.variance / weight))
-        late = -LAG * slow.rate / weight  # residual of readings late by `LAG`
         is_far, is_near = is_known & (np.abs(off) > least), is_known & (np.abs(off) < GONE * self._limits)
-        is_explained = (off < np.maximum(late, 0.0) + least) & (off > np.minimum(late, 0.0) - least)
+        is_explained = np.abs(off) < LONGEST * np.abs(slow.rate) / weight + least  # by a lag, see `lag_monitor`
         self._since = np.where(is_far, np.where(self._since < 0, block.start, self._since), -1)
         for i in np.flatnonzero(is_far & ~is_explained & (block.end - self._since >= LASTING)).tolist():
             if i not in self._last:

@@ -13,15 +13,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import SENSORS, Alarm, Array, Stream
-from ..wiring.readings import CLEAR, Lag, lag_near
+from ..types import NANO, SENSORS, Alarm, Array, Stream
+from ..wiring.readings import CLEAR, SPAN, Lag, lag_near
 from .alarms import change_text
-from .blocks import Block
+from .blocks import BLOCK, Block
 from .stream_readings import StreamReadings
 
 LEAST = 0.025  # s, lag from which on it is an alarm: a payload or a spring that is wrong shifts vibration by less
 SIGMAS = 10.0  # standard deviations that a lag has at least: before it has been so for a while its size is a mixture
-EVERY, WINDOWS = 20, (300, 150, 75)  # blocks between two estimates, and of each: shorter ones see a lag that is new
+EVERY = round(SPAN / (BLOCK * NANO))  # blocks between two estimates
+WINDOWS = 12 * EVERY, 6 * EVERY, 3 * EVERY  # blocks of each: shorter ones see a lag that is new
 
 
 class LagMonitor:
@@ -40,7 +41,7 @@ class LagMonitor:
     def begin(self) -> None:
         """Discard all readings, because the boom restarts at rest; alarms last until lags are known to be small."""
         self._number = 0
-        self._means: dict[Stream, deque[tuple[int, Array, Array]]] = {}  # stamp (ns), readings, expected ones of each block
+        self._means: dict[Stream, deque[tuple[int, Array]]] = {}  # of each block (ns): readings, expected ones
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -58,10 +59,9 @@ class LagMonitor:
         if block.number != self._number + 1:
             self._means.clear()
         self._number = block.number
-        for stream, (rows, *_) in readings.items():
-            if len(rows.stamps) and not SENSORS[stream].beside:
-                read = np.where(failing[stream], np.nan, rows.raw.mean(axis=0))
-                means = int(rows.stamps.mean()), read, read - rows.left.mean(axis=0)
+        for stream, each in readings.items():
+            if len(each.rows.stamps) and not SENSORS[stream].beside:
+                means = block.start, np.where(failing[stream], np.nan, each.means)
                 self._means.setdefault(stream, deque(maxlen=WINDOWS[0])).append(means)
         return [] if block.number % EVERY else self._judge(block.end)
 
@@ -88,13 +88,13 @@ def _exceeds(lag: Lag) -> bool:
     return abs(lag.lag) > max(LEAST, SIGMAS * lag.sigma)
 
 
-def _lag(means: deque[tuple[int, Array, Array]]) -> Lag:
+def _lag(means: deque[tuple[int, Array]]) -> Lag:
     """Return the lag of the window that a lag explains best, by the channels with all readings."""
-    stamps, *columns = map(np.array, zip(*means, strict=True))
+    stamps, both = map(np.array, zip(*means, strict=True))
     found = list[Lag]()
     for count in WINDOWS:
-        read, expected = (each[-count:] for each in columns)
-        is_whole = np.isfinite(read + expected).all(axis=0)
-        if is_whole.any():
-            found.append(lag_near(stamps[-count:], read[:, is_whole], expected[:, is_whole]))
+        newest = both[-count:]
+        newest = newest[:, :, np.isfinite(newest).all(axis=(0, 1))]
+        if newest.size:
+            found.append(lag_near(stamps[-count:], newest[:, 0], newest[:, 1]))
     return min(found, key=lambda lag: (lag.left, lag.sigma), default=Lag(0.0, np.inf))

@@ -214,7 +214,7 @@ class HealthMonitor:
         """Check the sensors of a stream one by one: stamps (k,) in ns, raw and expected readings (k, channels)."""
         monitor = self._sensors[stream]
         findings = self._checks[stream].look(np.asarray(stamps * NANO), raw, expected, block.end * NANO)
-        if findings.is_calm and not monitor.alarms:
+        if not (findings.flags or monitor.alarms):
             return []
         newest = (raw if stream is self._drive else raw - expected)[-1] if len(raw) else None
         return monitor.take(findings, block.start, block.end, newest)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..kernels.jit import SameTypes, hold
 from ..scene.schema import Scene
 from ..types import GIVE, Array, Mount, Stream, channels_of
+from .sensor_findings import FALSE_ALARM, OUTLIER, OUTSIDE, SILENT, SPIKES, STUCK, find
 from .sensor_findings import NOISY as IS_NOISY
-from .sensor_findings import OUTSIDE, SILENT, SPIKE, SPIKES, STUCK, find
 from .sensor_survey import LATELY, ROOM, CheckLimits, CheckWork, survey
 
 
@@ -54,9 +54,9 @@ NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; t
 JERK = 3.0  # m/s^3 of a cylinder in haste, which is no noise of its sensor: 0.2 m in 1.6 s
 USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
 NOISE_OVER = "noise_over_"  # and the name of a setting: how its figures are called
+MEASURED = 4.0  # times the stated noise, above which there may be more: a reading counts for so much at most
 MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
 REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to repeat
-FALSE_ALARM = 1e-12  # probability, for each reading, that a live sensor repeats for so long
 SILENT_FOR = 0.5  # s; readings that lie farther apart are no neighbours: neither jumps nor spikes show across such a gap
 MISSING = 0.1  # share of the readings
 
@@ -87,29 +87,16 @@ def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, 
     return found
 
 
-@dataclass(frozen=True)
-class SensorFindings:
-    """Findings in one block by channel, shape (channels,) each.
+class SensorFindings(NamedTuple):
+    """Findings in one block, shape (channels,) each.
 
-    They include the steps of jumps, and the distance of the newest readings from the expected ones.
+    flags : by kind, as alarms name them; empty if nothing was found. jumped : steps of jumps. level : distance of the newest
+    readings from the expected ones.
     """
 
-    stuck: Flags
-    noisy: Flags
-    spikes: Flags
+    flags: Mapping[str, Flags]
     jumped: Array
-    silent: Flags
-    outside: Flags
     level: Array
-    is_calm: bool = False
-    """True if nothing was found in any channel; `level` is unknown then."""
-
-    def by_kind(self) -> dict[str, Flags]:
-        """Return the findings by kind, as alarms name them."""
-        return {
-            "stuck": self.stuck, "noise": self.noisy, "spikes": self.spikes, "jump": self.jumped != 0.0,
-            "dropout": self.silent, "range": self.outside,
-        }  # fmt: skip
 
 
 class SensorCheck:
@@ -131,8 +118,8 @@ class SensorCheck:
         count, rows = len(low), 3 + ROOM
         margin, stated2 = 5.0 * self._sigma, self._sigma**2
         limits = CheckLimits(
-            gap=SILENT_FOR, cut=(4.0 * NOISY) ** 2 * stated2, stated=stated2, window=NOISY_WINDOW, long_window=USUAL_WINDOW,
-            leap=SPIKE * self._sigma, loud=NOISY**2, loudest_usual=NOISY**2 * stated2, lack=MISSING,
+            gap=SILENT_FOR, cut=(MEASURED * NOISY) ** 2 * stated2, stated=stated2, window=NOISY_WINDOW,
+            long_window=USUAL_WINDOW, leap=OUTLIER * self._sigma, loud=NOISY**2, loudest_usual=NOISY**2 * stated2, lack=MISSING,
             patience=repeats(sigma, resolution),
         )  # fmt: skip
         self._known = CheckWork(
@@ -152,8 +139,7 @@ class SensorCheck:
         )
         self._held = hold(self._known)
         self._survey, self._find, self._column = SameTypes(survey), SameTypes(find), np.zeros(rows)
-        none, unknown = np.zeros(count, dtype=bool), np.full(count, np.nan)
-        self._calm = SensorFindings(none, none, none, np.zeros(count), none, none, unknown, is_calm=True)
+        self._calm = SensorFindings({}, np.zeros(count), np.full(count, np.nan))
 
     @property
     def noise(self) -> float:
@@ -174,10 +160,22 @@ class SensorCheck:
         """
         rows = len(stamps)
         if not rows:
-            return self._calm if self._known.lately["first"][0] == math.inf else self._nothing(raw.shape[1], now)
+            silent = now - self._known.heard > SILENT_FOR
+            return self._calm._replace(flags={"dropout": silent}) if silent.any() else self._calm
         self._make_room(3 + rows)
-        is_calm, largest = self._survey(self._held, stamps, np.ascontiguousarray(raw), np.ascontiguousarray(expected), now)
-        return self._calm if is_calm else self._findings(largest, rows, now)
+        known = self._known
+        largest = self._survey(self._held, stamps, np.ascontiguousarray(raw), np.ascontiguousarray(expected))
+        interval = (known.times[2 + rows] - known.times[2]) / rows
+        is_motion = self._fastest > 0.0 and JERK * interval**3 > NOISY * self._sigma  # what bends readings so much
+        is_known = bool(now - known.lately["first"][0] > NOISY_WINDOW and not is_motion)  # how noisy the sensors are
+        flags, jumped = np.empty((5, len(known.power)), dtype=bool), np.empty(len(known.power))
+        if not self._find(self._held, largest, now, is_known, self._fastest, self._column, flags, jumped):
+            return self._calm
+        by_kind = {
+            "stuck": flags[STUCK], "noise": flags[IS_NOISY], "spikes": flags[SPIKES], "jump": jumped != 0.0,
+            "dropout": flags[SILENT], "range": flags[OUTSIDE],
+        }  # fmt: skip
+        return SensorFindings(by_kind, jumped, known.left[2 + rows].copy())
 
     def _make_room(self, rows: int) -> None:
         """Make room for `rows` readings, including the newest three before the block."""
@@ -186,23 +184,6 @@ class SensorCheck:
             times, raw, left = (np.resize(each, (2 * rows, *each.shape[1:])) for each in (known.times, known.raw, known.left))
             self._known, self._column = known._replace(times=times, raw=raw, left=left), np.zeros(2 * rows)
             self._held = hold(self._known)
-
-    def _findings(self, largest: float, rows: int, now: float) -> SensorFindings:
-        """Return the findings in so many readings, whose largest step is `largest`."""
-        known = self._known
-        interval = (known.times[2 + rows] - known.times[2]) / rows
-        is_motion = self._fastest > 0.0 and JERK * interval**3 > NOISY * self._sigma  # what bends readings so much
-        is_known = bool(now - known.lately["first"][0] > NOISY_WINDOW and not is_motion)  # how noisy the sensors are
-        flags, jumped = np.empty((5, len(known.power)), dtype=bool), np.empty(len(known.power))
-        if not self._find(self._held, largest, now, is_known, self._fastest, self._column, flags, jumped):
-            return self._calm
-        return SensorFindings(
-            flags[STUCK], flags[IS_NOISY], flags[SPIKES], jumped, flags[SILENT], flags[OUTSIDE], known.left[2 + rows].copy()
-        )
-
-    def _nothing(self, count: int, now: float) -> SensorFindings:
-        none, silent = np.zeros(count, dtype=bool), now - self._known.heard > SILENT_FOR
-        return SensorFindings(none, none, none, np.zeros(count), silent, none, np.full(count, np.nan))
 
 
 def repeats(sigma: float, resolution: float) -> int:

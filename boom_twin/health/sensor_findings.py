@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from statistics import NormalDist
 
 from ..kernels.jit import inner, kernel
 from .sensor_survey import loud, noise2_at
 
 STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
-SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its neighbours
-JUMP = 10.0  # likewise, by which readings change at once and for good
+FALSE_ALARM = 1e-12  # probability, for each reading, of a finding in white noise
+OUTLIER = -math.sqrt(2.0) * NormalDist().inv_cdf(0.5 * FALSE_ALARM)  # difference of two readings, over their noise
 QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
 REPEATS_FOR = 0.4  # s, at least, of one reading again and again
 ENOUGH, MEDIAN2 = 6, 0.4549  # third differences whose median tells noise; that of the square of a standard normal value
@@ -42,8 +43,8 @@ def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
     for i in range(power.shape[0]):
         is_spiky, jumped[i] = False, 0.0
         if largest > limits.leap:
-            noise = noise_of(sensors, count, i, column)
-            is_spiky, jumped[i] = has_spikes(sensors, count, i, SPIKE * noise), jump(sensors, count, i, JUMP * noise, fastest)
+            least = OUTLIER * noise_of(sensors, count, i, column)
+            is_spiky, jumped[i] = has_spikes(sensors, count, i, least), jump(sensors, count, i, least, fastest)
         flags[STUCK, i] = live and sensors.run[i] >= limits.patience and newest - sensors.since[i] >= REPEATS_FOR
         flags[NOISY, i] = is_known and power[i] > loud(sensors)
         flags[SPIKES, i] = is_known and is_spiky

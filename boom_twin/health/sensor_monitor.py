@@ -15,12 +15,11 @@ import numpy as np
 from ..sensor_kinds import SensorKind
 from ..types import NANO, Alarm, Array
 from .alarms import change_text
-from .sensor_check import MISSTATED, NOISE_OVER, Flags, SensorFindings
+from .sensor_check import MEASURED, MISSTATED, NOISE_OVER, Flags, SensorFindings
 
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended
 AGAIN = 60_000_000_000  # ns between failures of one intermittent contact
 CAME_BACK = 0.3  # of a jump, by which a sensor that came back may still be off
-MEASURED = 4.0  # times the stated noise, above which there may be more: a reading counts for so much at most
 
 
 def noise_as_text(figures: Mapping[str, Any]) -> list[str]:
@@ -105,7 +104,7 @@ class SensorMonitor:
         `newest`: by how much the block's last readings are off (strokes: the readings), shape (channels,), if it has any.
         """
         news = self._back_after_start(end, newest)
-        if not findings.is_calm or self._faults or self._intermittent:
+        if findings.flags or self._faults or self._intermittent:
             news += self._found(findings, start, end, newest)
         self._mask()
         return news
@@ -113,7 +112,7 @@ class SensorMonitor:
     def _found(self, findings: SensorFindings, start: int, end: int, newest: Array | None) -> list[Alarm]:
         """Begin, keep and end faults by the findings; return alarms that began or ended. See `take`."""
         news: list[Alarm] = []
-        for kind, flags in findings.by_kind().items():
+        for kind, flags in findings.flags.items():
             if kind not in self._sensors.alarms or not flags.any():
                 continue
             for channel in np.flatnonzero(flags & self._there).tolist():

@@ -39,12 +39,13 @@ class ReadingsWork(NamedTuple):
     """State of `summarise` for one stream.
 
     stated : variance of the noise.
-    counts : (channels,) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
+    counts, means : (channels,), (2, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
     slow : SlowMeans.
     """
 
     stated: float
     counts: Array
+    means: Array
     slow: SlowMeans
 
 
@@ -53,9 +54,9 @@ class CheckLimits(NamedTuple):
     """Limits of `survey` and `find`.
 
     gap : time (s) between readings above which they are not compared. cut : largest variance that one outlier adds. stated :
-    variance of the noise. window, long_window : averaging times (s) of a channel's noise and of the usual noise. A block with
-    less than these has no finding: leap, change between two readings; loud, multiple of the usual variance, bounded by
-    loudest_usual; lack, share of missing readings; patience, repetitions of a reading.
+    variance of the noise. window, long_window : averaging times (s) of a channel's noise and of the usual noise. Findings need
+    more than these: leap, change between two readings; loud, multiple of the usual variance, bounded by loudest_usual; lack,
+    share of missing readings; patience, repetitions of a reading.
     """
 
     gap: float
@@ -136,7 +137,7 @@ def noise2_at(times, values, t, i):
 
 
 @kernel
-def survey(sensors, stamps, raw, expected, now):
+def survey(sensors, stamps, raw, expected):
     """Take a block of readings, and update the statistics of every channel.
 
     Parameters
@@ -145,14 +146,10 @@ def survey(sensors, stamps, raw, expected, now):
         Updated with the block.
     stamps, raw, expected : ndarray, shape (k,), (k, channels), (k, channels)
         Stamps (s), readings, readings by the model; k > 0.
-    now : float
-        End of the block, s.
 
     Returns
     -------
-    is_calm : bool
-        True if no channel can have a finding.
-    largest : float
+    float
         Largest change of `left` between two readings, except across a gap.
     """
     limits, lately, rows = sensors.limits, sensors.lately[0], stamps.shape[0]
@@ -161,11 +158,10 @@ def survey(sensors, stamps, raw, expected, now):
     if not lately.first <= stamps[0]:
         lately.first = stamps[0]
     span = max(stamps[rows - 1] - stamps[0], 1e-3)
-    largest, loudest, longest, lack, most, is_whole = go_on(sensors, stamps, raw, expected, min(1.0, span / limits.window))
+    largest = go_on(sensors, stamps, raw, expected, min(1.0, span / limits.window))
     lately.noise = usual_power(sensors.power, limits.stated)
     lately.lasting += min(1.0, span / limits.long_window) * (lately.noise - lately.lasting)
-    is_live = is_whole and now - stamps[rows - 1] <= limits.gap and lack <= limits.lack and longest < limits.patience
-    return is_live and most <= 0.5 * rows and largest <= limits.leap and loudest <= loud(sensors), largest
+    return largest
 
 
 @inner
@@ -208,17 +204,13 @@ def usual_power(power, stated):
 
 @inner
 def go_on(sensors, stamps, raw, expected, share):
-    """Take the readings of a block, with weight `share` in the averages.
-
-    Return the largest change of `left` except across a gap, the largest `power`, `run`, `missing` and `outside`, and True if no
-    reading is missing.
-    """
+    """Take the readings of a block, with weight `share` in the averages; return the largest change of `left` within gaps."""
     times, all_raw, left, count = sensors.times, sensors.raw, sensors.left, 3 + stamps.shape[0]
     gap, cut, variance = sensors.limits.gap, sensors.limits.cut, sensors.limits.stated
     power, run, missing, outside = sensors.power, sensors.run, sensors.missing, sensors.outside
     for t in range(3, count):
         times[t] = stamps[t - 3]
-    largest, loudest, longest, lack, most, is_whole = 0.0, 0.0, 0, 0.0, 0.0, True
+    largest = 0.0
     for i in range(power.shape[0]):
         total, known, lacking, newest, outside[i] = 0.0, 0, 0, -1, 0.0
         for t in range(3, count):
@@ -243,8 +235,6 @@ def go_on(sensors, stamps, raw, expected, share):
                 run[i], sensors.since[i] = 0, times[t]
             if math.isfinite(all_raw[t, i]):
                 newest = t
-            else:
-                is_whole = False
         if newest >= 0:
             if not times[newest] <= sensors.heard[i]:
                 sensors.heard[i] = times[newest]
@@ -257,10 +247,7 @@ def go_on(sensors, stamps, raw, expected, share):
                 power[i] = min(heard, variance)
             else:
                 power[i] += share * (heard - power[i])
-        if power[i] > loudest:
-            loudest = power[i]
-        longest, lack, most = max(longest, run[i]), max(lack, missing[i]), max(most, outside[i])
-    return largest, loudest, longest, lack, most, is_whole
+    return largest
 
 
 @kernel
@@ -277,7 +264,7 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
     share : float
         Weight of the block in the slow means.
     """
-    counts, slow, last = work.counts, work.slow, stamps.shape[0] - 1
+    counts, means, slow, last = work.counts, work.means, work.slow, stamps.shape[0] - 1
     span = (stamps[last] - stamps[0]) * NANO
     for i in range(raw.shape[1]):
         known, read, off, variance = 0, 0.0, 0.0, 0.0
@@ -287,14 +274,16 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
                 read += raw[t, i]
                 off += left[t, i]
                 variance += sigmas[t, i] * sigmas[t, i]
-        counts[i] = known
+        counts[i], means[:, i] = known, math.nan
+        if known > 0:
+            means[0, i], means[1, i] = read / known, (read - off) / known
         rate = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span if span > 0.0 else math.nan
         if masked[i]:
             for each in (slow.read, slow.expected, slow.variance, slow.rate, slow.weight):
                 each[i] = 0.0
         elif known > 0:
-            slow.read[i] += share * (read / known - slow.read[i])
-            slow.expected[i] += share * ((read - off) / known - slow.expected[i])
+            slow.read[i] += share * (means[0, i] - slow.read[i])
+            slow.expected[i] += share * (means[1, i] - slow.expected[i])
             slow.variance[i] += share * (variance / known - slow.variance[i])
             slow.weight[i] += share * (1.0 - slow.weight[i])
         if math.isfinite(rate) and not masked[i]:

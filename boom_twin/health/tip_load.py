@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..types import Alarm, Array, Ranked
+from ..types import NANO, Alarm, Array, Ranked
 from .alarms import change_text
+from .deviations import SETTLED
+from .stream_readings import WINDOW
 
 CAUSE = "tip.load"
 CERTAIN = 3.0  # standard deviations by which a force is above the limit, or contradicts the lengths
-AFTER, OVER = 2_000_000_000, 6_000_000_000  # ns from the first passing to a later one that raises it; without one, to its end
+AFTER = round(WINDOW / NANO)  # ns from the first passing to a later one that raises the alarm; it ends `SETTLED` after the last
 
 
 class TipLoadMonitor:
@@ -46,7 +48,7 @@ class TipLoadMonitor:
         direction = loads[1] / size
         predicted = float(direction @ loads[0])
         doubt, sigma = ((variances @ direction**2) ** 0.5).tolist()
-        if self._since and stamp - self._last > OVER:
+        if self._since and stamp - self._last > SETTLED:
             ended = [] if self.alarm is None else [replace(self.alarm, until=self._last)]
             self.begin()
             return ended

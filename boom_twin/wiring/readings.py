@@ -112,7 +112,7 @@ def _at(chosen: NDArray[np.int64], numbers: NDArray[np.int64], means: Array, rea
 
 SPAN = 2.0  # s, span whose mean is removed, so that zeros and slow model errors are no lag
 LONGEST, COARSE = 1.0, 0.05  # s, largest lag of the search; spacing of the first guesses, and largest step of Gauss-Newton
-FEWEST = 3.0  # least effective number of moving spans
+FEWEST = 2.0  # least effective number of moving spans
 CLEAR = 0.4  # largest squared residual with the lag, relative to that without
 FLOOR = 1e-3  # s, standard deviation of a lag by model errors
 
@@ -130,10 +130,8 @@ class Lag(NamedTuple):
 
 def lag_of(stamps: NDArray[np.int64], read: Array, expected: Array) -> Lag:
     """Return the lag of readings behind expected ones, both (k, channels), at `stamps` (k,) in ns: near the best guess."""
-    times = (stamps - stamps[0]) * NANO
-    spans = (times // SPAN).astype(int)
-    guesses = np.arange(-LONGEST, LONGEST + COARSE, COARSE)
-    sizes = np.array([_sizes(_left(times, spans, read, expected, lag)[0]) for lag in guesses])
+    guesses, residuals = np.arange(-LONGEST, LONGEST + COARSE, COARSE), _Residuals(stamps, read, expected)
+    sizes = np.array([_sizes(residuals.left(lag)[0]) for lag in guesses])
     return lag_near(stamps, read, expected, float(guesses[int((sizes / sizes.min(axis=0)).sum(axis=1).argmin())]))
 
 
@@ -142,19 +140,23 @@ def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, guess: flo
 
     Each channel counts by what is left of it. The scatter among spans gives the deviation.
     """
-    times, lag = (stamps - stamps[0]) * NANO, guess
-    spans = (times // SPAN).astype(int)
-    for _ in range(round(LONGEST / COARSE)):
-        left, slopes = _left(times, spans, read, expected, lag)
+    if (stamps[-1] - stamps[0]) * NANO < FEWEST * SPAN:
+        return Lag(0.0, math.inf)
+    residuals, lag = _Residuals(stamps, read, expected), guess
+    at_zero = residuals.left(0.0)
+    for _ in range(round(2.0 * LONGEST / COARSE)):
+        left, slopes = at_zero if lag == 0.0 else residuals.left(lag)
         sizes = _sizes(left)
-        by, weight = (_summed(spans, np.nan_to_num(each / sizes)).sum(axis=1) for each in (-left * slopes, slopes**2))
+        by, weight = (residuals.summed(np.nan_to_num(each / sizes)).sum(axis=1) for each in (-left * slopes, slopes**2))
         if not weight.sum() > 0.0 or weight.sum() ** 2 < FEWEST * (weight**2).sum():
             return Lag(0.0, math.inf)
         change = float(by.sum() / weight.sum())
         lag += min(max(change, -COARSE), COARSE)
-        if abs(change) < 0.1 * FLOOR:
+        if abs(change) < FLOOR:
             break
-    share = left.shape[1] / float((_sizes(_left(times, spans, read, expected, 0.0)[0]) / sizes).sum())
+    else:
+        return Lag(0.0, math.inf)
+    share = left.shape[1] / float((_sizes(at_zero[0]) / sizes).sum())
     if abs(lag) > LONGEST or (abs(lag) > COARSE and share > CLEAR):
         return Lag(0.0, math.inf)
     scatter = math.sqrt(float(((by - change * weight) ** 2).sum())) / float(weight.sum())
@@ -166,25 +168,32 @@ def _sizes(left: Array) -> Array:
     return np.asarray(np.nansum(left**2, axis=0) + 1e-300)
 
 
-def _left(times: Array, spans: NDArray[np.int64], read: Array, expected: Array, lag: float) -> tuple[Array, Array]:
-    """Return residuals to the readings expected `lag` s before, and their rates, each less its mean in a span."""
-    then, step = times - lag, 0.005
-    columns = [np.interp(then, times, column) for column in expected.T]
-    slopes = [(np.interp(then + step, times, c) - np.interp(then - step, times, c)) / (2.0 * step) for c in expected.T]
-    left = read - np.column_stack(columns)
-    left[(then < times[0]) | (then > times[-1])] = np.nan
-    return _less_mean(spans, left), _less_mean(spans, np.where(np.isfinite(left), np.column_stack(slopes), np.nan))
+class _Residuals:
+    """Residuals of readings to the expected ones of another time, less their means in spans of `SPAN`; see `lag_of`."""
 
+    def __init__(self, stamps: NDArray[np.int64], read: Array, expected: Array) -> None:
+        self._times, self._read = (stamps - stamps[0]) * NANO, read
+        self._starts = np.flatnonzero(np.diff(self._times // SPAN, prepend=-1.0))
+        self._expected = np.stack([expected, np.gradient(expected, self._times, axis=0)])
 
-def _less_mean(spans: NDArray[np.int64], values: Array) -> Array:
-    known = np.isfinite(values)
-    sums = _summed(spans, np.where(known, values, 0.0))
-    counts = np.maximum(_summed(spans, known.astype(float)), 1.0)
-    return np.asarray(values - (sums / counts)[spans])
+    def summed(self, values: Array) -> Array:
+        """Return the sums of values (k, channels) over every span."""
+        return np.asarray(np.add.reduceat(values, self._starts, axis=0))
 
+    def left(self, lag: float) -> tuple[Array, Array]:
+        """Return residuals to the readings expected `lag` s before, and their rates."""
+        times, then = self._times, self._times - lag
+        before = np.clip(np.searchsorted(times, then) - 1, 0, len(times) - 2)
+        share = ((then - times[before]) / (times[before + 1] - times[before]))[:, None]
+        expected, rates = self._expected[:, before] + share * (self._expected[:, before + 1] - self._expected[:, before])
+        left = self._read - expected
+        left[(then < 0.0) | (then > times[-1])] = np.nan
+        return self._less_mean(left), self._less_mean(np.where(np.isfinite(left), rates, np.nan))
 
-def _summed(spans: NDArray[np.int64], values: Array) -> Array:
-    return np.column_stack([np.bincount(spans, column, spans.max() + 1) for column in values.T])
+    def _less_mean(self, values: Array) -> Array:
+        known = np.isfinite(values)
+        means = self.summed(np.where(known, values, 0.0)) / np.maximum(self.summed(known.astype(float)), 1.0)
+        return np.asarray(values - np.repeat(means, np.diff(self._starts, append=len(values)), axis=0))
 
 
 class Expected(NamedTuple):

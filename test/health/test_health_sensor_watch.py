@@ -14,19 +14,10 @@ from boom_twin.types import SENSORS
 
 BLOCK, NAMES = 100_000_000, ("joint_1", "joint_2")
 
-KINDS = ("stuck", "noise", "spikes", "jump", "dropout", "range")
-
 
 def findings(channel: int | None = None, kind: str = "", jump: float = 0.0, level: float = math.nan) -> SensorFindings:
-    flags = {each: np.zeros(2, dtype=bool) for each in KINDS}
-    jumped = np.zeros(2)
-    if kind == "jump":
-        jumped[channel] = jump
-    elif kind:
-        flags[kind][channel] = True
-    return SensorFindings(
-        flags["stuck"], flags["noise"], flags["spikes"], jumped, flags["dropout"], flags["range"], np.full(2, level)
-    )
+    found = np.arange(2) == channel
+    return SensorFindings({kind: found} if kind else {}, jump * found, np.full(2, level))
 
 
 class Watched:

@@ -34,7 +34,7 @@ class Stream:
         """First time (s from now) of every kind and channel."""
         found: dict[tuple[str, int], float] = {}
         for k in range(blocks):
-            for kind, flags in self.look(**options).by_kind().items():
+            for kind, flags in self.look(**options).flags.items():
                 for channel in np.flatnonzero(flags).tolist():
                     found.setdefault((kind, channel), (k + 1) * ROWS * PERIOD)
         return found
@@ -106,9 +106,9 @@ def test_haste_is_no_noise_at_fifty_hertz_and_noise_is():
 
     for block in range(400):
         found = look(block, 1.0)
-        assert not found.noisy.any() and not found.spikes.any()
+        assert found.flags == {}
     found = [look(block, np.array([4.0, 1.0, 1.0, 1.0])) for block in range(400, 440)]
-    assert all(each.noisy.tolist() == [True, False, False, False] for each in found[-20:])
+    assert all(each.flags["noise"].tolist() == [True, False, False, False] for each in found[-20:])
 
 
 @pytest.mark.parametrize("are_of_readings", [True, False])
@@ -122,7 +122,7 @@ def test_uneven_stamps_of_a_fast_cylinder_are_no_noise(are_of_readings):
         moving = 0.3 * np.sin(2.0 * (stamps if are_of_readings else even))
         readings = np.column_stack([moving, *([np.full(20, 0.3)] * 3)]) + rng.normal(0.0, sigma, (20, 4))
         found = check.look(stamps, readings, np.zeros((20, 4)), 0.1 * block + 0.1)
-        assert not found.noisy.any() and not found.spikes.any()
+        assert found.flags == {}
 
 
 def test_a_little_more_noise_is_not_noisy():
@@ -136,7 +136,8 @@ def test_all_noisier_than_stated_is_no_fault_but_told():
 
     def look(block, scale):
         stamps = 0.1 * block + 0.02 * np.arange(5)
-        return check.look(stamps, rng.normal(0.0, 1.0, (5, 4)) * scale, np.zeros((5, 4)), 0.1 * block + 0.1).noisy
+        found = check.look(stamps, rng.normal(0.0, 1.0, (5, 4)) * scale, np.zeros((5, 4)), 0.1 * block + 0.1)
+        return found.flags.get("noise", np.zeros(4, dtype=bool))
 
     assert not any(look(block, 2.2 * SIGMA).any() for block in range(1200))
     assert check.noise == pytest.approx(2.2, rel=0.15)
