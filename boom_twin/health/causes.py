@@ -7,7 +7,8 @@ A cause is named if its posterior probability is high. Three facts limit that.
 - Successive innovations are not independent. So likelihoods are raised to the power `TEMPER`.
 - An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. In each
   second no log likelihood counts as more than `MOST_GAIN` below the best.
-- Parameters of a healthy boom are wrong by `WRONG`. A fault is named only if it is larger than these errors make it appear.
+- Parameters of a healthy boom are wrong by `WRONG`. So its likelihood is that of the boom as believed, and what these errors
+  are expected to cost that. A fault is named only if its size is likelier than one that these errors make appear.
 """
 
 from __future__ import annotations
@@ -29,7 +30,6 @@ from .alarms import UNKNOWN
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
 LATE = 0.02  # s, delay of the stamps of a stream
 WRONG = 0.02  # relative standard deviation of each parameter of a healthy boom
-HEAD_START = 30.0  # nats of the hypothesis without a fault; parameters with 2 % of error gain as much
 TEMPER = math.log(20.0) / 25.0  # power of likelihoods: 25 nats more make a cause 20 times as probable
 MOST_GAIN = 12.0  # nats by which the likelihood of a second is below the best, at most
 MEMORY = 60  # s of gains that are kept
@@ -111,7 +111,7 @@ def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -
     """
     mass, sections = explain(scene).mass, [name for name in parameter_names(scene) if name.endswith(".EI")]
     base = [name for name in parameter_names(scene) if name == "base.stiffness"]
-    found = [Fault(name, "softer", LOSS, name not in sections[-1:]) for name in [*_springs(scene), *sections, *base]]
+    found = [Fault(name, "softer", LOSS) for name in [*_springs(scene), *sections, *base]]
     found.append(Fault("oil.k", "softer", OIL_LOSS, False))
     for cause, size in (("tip.payload", LOAD * mass), ("line_fill", LOAD * mass / scene.reach)):
         found.append(Fault(cause, "more", size))
@@ -157,13 +157,19 @@ class Evidence:
     Parameters
     ----------
     faults : sequence of Fault
+    usual : sequence of float
+        Their `usual_size`.
     odds : float
         Posterior probability required to name a cause.
     """
 
-    def __init__(self, faults: Sequence[Fault], odds: float) -> None:
+    def __init__(self, faults: Sequence[Fault], usual: Sequence[float], odds: float) -> None:
         self._odds = odds
         self._faults, none = tuple(faults), np.zeros(len(faults))
+        self._wrong = none.copy()  # share of a fault's cost that its usual size has: costs are as squares of sizes
+        for i, (fault, size) in enumerate(zip(faults, usual, strict=True)):
+            if (fault.kind == "softer" and fault.is_told) or fault.cause == "tip.payload":  # the others repeat these
+                self._wrong[i] = (size / fault.size) ** 2 / sum(other.cause == fault.cause for other in faults)
         self._gains, self._stamps = deque([none], maxlen=MEMORY), deque([0], maxlen=MEMORY)
 
     def take(self, stamp: int, likelihoods: Array) -> Verdict | None:
@@ -174,12 +180,14 @@ class Evidence:
         likelihoods : ndarray, shape (1 + faults,)
             That of the boom as believed first, nats.
         """
+        believed = likelihoods[0] + self._wrong @ np.maximum(likelihoods[0] - likelihoods[1:], 0.0)
+        likelihoods = np.array([believed, *likelihoods[1:]])
         bounded = np.maximum(likelihoods, likelihoods.max() - MOST_GAIN)
         self._gains.append(self._gains[-1] + bounded[1:] - bounded[0])
         self._stamps.append(stamp)
         rises = self._gains[-1] - np.array(self._gains)
         evidence, onsets = rises.max(axis=0), len(rises) - 1 - rises[::-1].argmax(axis=0)
-        causes = {"": HEAD_START}
+        causes = {"": 0.0}  # the healthy boom and each cause are equally probable before
         for fault, rise in zip(self._faults, evidence.tolist(), strict=True):
             causes[fault.cause] = max(causes.get(fault.cause, 0.0), rise)
         weights = np.exp(TEMPER * (np.array(list(causes.values())) - max(causes.values())))
