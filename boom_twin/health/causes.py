@@ -106,12 +106,10 @@ def _springs(scene: Scene) -> list[str]:
 def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
     """Return all single faults that are compared for a boom, without zeros of angles that drive the model.
 
-    Three give no alarm. Warm oil softens all cylinders. The outermost section bends mostly in modes that the filter leaves out.
-    The zero of the IMU looks like model errors in fast moves.
+    Two give no alarm. Warm oil softens all cylinders. The zero of the IMU looks like model errors in fast moves.
     """
-    mass, sections = explain(scene).mass, [name for name in parameter_names(scene) if name.endswith(".EI")]
-    base = [name for name in parameter_names(scene) if name == "base.stiffness"]
-    found = [Fault(name, "softer", LOSS) for name in [*_springs(scene), *sections, *base]]
+    mass = explain(scene).mass
+    found = [Fault(name, "softer", LOSS) for name in parameter_names(scene) if name.endswith((".k", ".EI", ".stiffness"))]
     found.append(Fault("oil.k", "softer", OIL_LOSS, False))
     for cause, size in (("tip.payload", LOAD * mass), ("line_fill", LOAD * mass / scene.reach)):
         found.append(Fault(cause, "more", size))
@@ -156,20 +154,18 @@ class Evidence:
 
     Parameters
     ----------
+    scene : Scene
     faults : sequence of Fault
-    usual : sequence of float
-        Their `usual_size`.
     odds : float
         Posterior probability required to name a cause.
     """
 
-    def __init__(self, faults: Sequence[Fault], usual: Sequence[float], odds: float) -> None:
-        self._odds = odds
-        self._faults, none = tuple(faults), np.zeros(len(faults))
+    def __init__(self, scene: Scene, faults: Sequence[Fault], odds: float) -> None:
+        self._odds, self._faults, none = odds, tuple(faults), np.zeros(len(faults))
         self._wrong = none.copy()  # share of a fault's cost that its usual size has: costs are as squares of sizes
-        for i, (fault, size) in enumerate(zip(faults, usual, strict=True)):
+        for i, fault in enumerate(faults):
             if (fault.kind == "softer" and fault.is_told) or fault.cause == "tip.payload":  # the others repeat these
-                self._wrong[i] = (size / fault.size) ** 2 / sum(other.cause == fault.cause for other in faults)
+                self._wrong[i] = (usual_size(scene, fault) / fault.size) ** 2 / [x.cause for x in faults].count(fault.cause)
         self._gains, self._stamps = deque([none], maxlen=MEMORY), deque([0], maxlen=MEMORY)
 
     def take(self, stamp: int, likelihoods: Array) -> Verdict | None:
@@ -195,8 +191,7 @@ class Evidence:
         best = int(np.argmax(evidence))
         if chances[self._faults[best].cause] < self._odds:
             return None
-        ranked = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])
-        shown = ranked[:3]
+        shown = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])[:3]
         shown.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in shown))))
         return Verdict(best, self._stamps[min(int(onsets[best]) + 1, len(self._stamps) - 1)], tuple(shown))
 
@@ -205,12 +200,10 @@ def evidence_of(fault: Fault, spread: float) -> str:
     """Return size and standard deviation of a fault as text."""
     size = fault.size
     if fault.kind == "softer":
-        k = fault.cause.rpartition(".")[2]
-        low, high = max(size - 2.0 * spread, 0.0), size + 2.0 * spread
-        return f"{k} {100.0 * size:.0f} % lower ({100.0 * low:.0f} to {100.0 * high:.0f})"
+        part, low, high = fault.cause.rpartition(".")[2], max(size - 2.0 * spread, 0.0), size + 2.0 * spread
+        return f"{part} {100.0 * size:.0f} % lower ({100.0 * low:.0f} to {100.0 * high:.0f})"
     if fault.is_load:
-        unit = "kg" if fault.cause == "tip.payload" else "kg/m"
-        return f"by {size:.2g} {unit} (+- {max(spread, 0.1):.1g})"
+        return f"by {size:.2g} {'kg' if fault.cause == 'tip.payload' else 'kg/m'} (+- {max(spread, 0.1):.1g})"
     if fault.kind == "late":
         return f"by {1e3 * size:.0f} ms (+- {max(1e3 * spread, 1.0):.0f})"
     if fault.channel.startswith("cylinder_force"):

@@ -204,8 +204,7 @@ class FaultTwins:
 
     def _decide_anew(self) -> None:
         """Discard all evidence of faults."""
-        usual = [usual_size(self._scene, fault) for fault in self._faults]
-        self._decision, self._age = Evidence(self._faults, usual, self._odds), 0
+        self._decision, self._age = Evidence(self._scene, self._faults, self._odds), 0
         self._evidence = np.array([twin.evidence for twin in self._twins])
 
     def _made(self, each: Hypothesis) -> Follower:
@@ -249,14 +248,13 @@ class FaultTwins:
         A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show.
         """
         fault = self._faults[verdict.place]
-        if fault.cause.startswith("cylinder_") and fault.kind == "softer" and fault not in self._named:
+        if fault in self._named:
+            return self._ended(fault, verdict.onset)
+        if fault.cause.startswith("cylinder_") and fault.kind == "softer":
             creeps = int(fault.channel.removeprefix("cylinder_")) - 1 in self._creep.creeping
             if creeps or stamp - verdict.onset < SPAN * SECOND:
                 return []
-        if fault in self._named:
-            return self._ended(fault, verdict.onset)
-        found = self._sized(fault, verdict.onset)
-        if found is None:
+        if (found := self._sized(fault, verdict.onset)) is None:
             self._decide_anew()
             return []
         sized, spread, onset = found

@@ -26,7 +26,7 @@ ENOUGH = math.log(2 * 19.0) / TEMPER  # nats for odds of 0.95 to 0.05 against th
 
 def verdict(faults, gains):
     """Return the first verdict on gains (seconds, faults), and the second in which it comes."""
-    evidence = Evidence(faults, [0.02 for _ in faults], ODDS)
+    evidence = Evidence(load_scene(), faults, ODDS)
     for second, row in enumerate(gains):
         if (found := evidence.take(second * SECOND, np.array([0.0, *row]))) is not None:
             return found, second
