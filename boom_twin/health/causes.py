@@ -111,7 +111,7 @@ def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -
     mass = explain(scene).mass
     found = [Fault(name, "softer", LOSS) for name in parameter_names(scene) if name.endswith((".k", ".EI", ".stiffness"))]
     found.append(Fault("oil.k", "softer", OIL_LOSS, False))
-    for cause, size in (("tip.payload", LOAD * mass), ("line_fill", LOAD * mass / scene.reach)):
+    for cause, size in (("tip.payload", LOAD * mass), ("line_fill", 2.0 * LOAD * mass / scene.reach)):
         found.append(Fault(cause, "more", size))
         if parameter(scene, cause) > 0.0:
             found.append(Fault(cause, "less", size))

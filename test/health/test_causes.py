@@ -80,6 +80,8 @@ def test_a_hypothesis_is_the_scene_with_its_faults():
     assert both.doubted == {"tip_imu_x", "tip_imu_z"}
     assert both.load(-1.0, -1.0)["line_fill"] == 2.0
     assert both.load(30.0, 5.0) == {"payload": 30.0, "line_fill": 7.0}
+    sizes = {fault.cause: fault.size for fault in possible_faults(scene)}
+    assert sizes["line_fill"] * scene.reach / 2.0 == pytest.approx(sizes["tip.payload"])  # they bend the first joint alike
     (oil,) = (fault for fault in possible_faults(scene) if fault.cause == "oil.k")
     for before, warm in zip(scene.joints, hypothesis(scene, [oil]).scene.joints, strict=True):
         assert warm.cylinder.k == pytest.approx(0.9 * before.cylinder.k)
