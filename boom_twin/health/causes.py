@@ -7,7 +7,8 @@ A cause is named if its posterior probability is high. Three facts limit that.
 - Successive innovations are not independent. So likelihoods are raised to the power `TEMPER`.
 - An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. In each
   second no log likelihood counts as more than `MOST_GAIN` below the best.
-- Parameters of a healthy boom are wrong by `WRONG`. A fault is named only if it is larger than these errors make it appear.
+- Parameters of a healthy boom are wrong by `WRONG`. So its likelihood is that of the boom as believed, and what these errors
+  are expected to cost that. A fault is named only if its size is likelier than one that these errors make appear.
 """
 
 from __future__ import annotations
@@ -29,7 +30,6 @@ from .alarms import UNKNOWN
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
 LATE = 0.02  # s, delay of the stamps of a stream
 WRONG = 0.02  # relative standard deviation of each parameter of a healthy boom
-HEAD_START = 30.0  # nats of the hypothesis without a fault; parameters with 2 % of error gain as much
 TEMPER = math.log(20.0) / 25.0  # power of likelihoods: 25 nats more make a cause 20 times as probable
 MOST_GAIN = 12.0  # nats by which the likelihood of a second is below the best, at most
 MEMORY = 60  # s of gains that are kept
@@ -106,14 +106,12 @@ def _springs(scene: Scene) -> list[str]:
 def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
     """Return all single faults that are compared for a boom, without zeros of angles that drive the model.
 
-    Three give no alarm. Warm oil softens all cylinders. The outermost section bends mostly in modes that the filter leaves out.
-    The zero of the IMU looks like model errors in fast moves.
+    Two give no alarm. Warm oil softens all cylinders. The zero of the IMU looks like model errors in fast moves.
     """
-    mass, sections = explain(scene).mass, [name for name in parameter_names(scene) if name.endswith(".EI")]
-    base = [name for name in parameter_names(scene) if name == "base.stiffness"]
-    found = [Fault(name, "softer", LOSS, name not in sections[-1:]) for name in [*_springs(scene), *sections, *base]]
+    mass = explain(scene).mass
+    found = [Fault(name, "softer", LOSS) for name in parameter_names(scene) if name.endswith((".k", ".EI", ".stiffness"))]
     found.append(Fault("oil.k", "softer", OIL_LOSS, False))
-    for cause, size in (("tip.payload", LOAD * mass), ("line_fill", LOAD * mass / scene.reach)):
+    for cause, size in (("tip.payload", LOAD * mass), ("line_fill", 2.0 * LOAD * mass / scene.reach)):
         found.append(Fault(cause, "more", size))
         if parameter(scene, cause) > 0.0:
             found.append(Fault(cause, "less", size))
@@ -156,14 +154,18 @@ class Evidence:
 
     Parameters
     ----------
+    scene : Scene
     faults : sequence of Fault
     odds : float
         Posterior probability required to name a cause.
     """
 
-    def __init__(self, faults: Sequence[Fault], odds: float) -> None:
-        self._odds = odds
-        self._faults, none = tuple(faults), np.zeros(len(faults))
+    def __init__(self, scene: Scene, faults: Sequence[Fault], odds: float) -> None:
+        self._odds, self._faults, none = odds, tuple(faults), np.zeros(len(faults))
+        self._wrong = none.copy()  # share of a fault's cost that its usual size has: costs are as squares of sizes
+        for i, fault in enumerate(faults):
+            if (fault.kind == "softer" and fault.is_told) or fault.cause == "tip.payload":  # the others repeat these
+                self._wrong[i] = (usual_size(scene, fault) / fault.size) ** 2 / [x.cause for x in faults].count(fault.cause)
         self._gains, self._stamps = deque([none], maxlen=MEMORY), deque([0], maxlen=MEMORY)
 
     def take(self, stamp: int, likelihoods: Array) -> Verdict | None:
@@ -174,12 +176,14 @@ class Evidence:
         likelihoods : ndarray, shape (1 + faults,)
             That of the boom as believed first, nats.
         """
+        believed = likelihoods[0] + self._wrong @ np.maximum(likelihoods[0] - likelihoods[1:], 0.0)
+        likelihoods = np.array([believed, *likelihoods[1:]])
         bounded = np.maximum(likelihoods, likelihoods.max() - MOST_GAIN)
         self._gains.append(self._gains[-1] + bounded[1:] - bounded[0])
         self._stamps.append(stamp)
         rises = self._gains[-1] - np.array(self._gains)
         evidence, onsets = rises.max(axis=0), len(rises) - 1 - rises[::-1].argmax(axis=0)
-        causes = {"": HEAD_START}
+        causes = {"": 0.0}  # the healthy boom and each cause are equally probable before
         for fault, rise in zip(self._faults, evidence.tolist(), strict=True):
             causes[fault.cause] = max(causes.get(fault.cause, 0.0), rise)
         weights = np.exp(TEMPER * (np.array(list(causes.values())) - max(causes.values())))
@@ -187,8 +191,7 @@ class Evidence:
         best = int(np.argmax(evidence))
         if chances[self._faults[best].cause] < self._odds:
             return None
-        ranked = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])
-        shown = ranked[:3]
+        shown = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])[:3]
         shown.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in shown))))
         return Verdict(best, self._stamps[min(int(onsets[best]) + 1, len(self._stamps) - 1)], tuple(shown))
 
@@ -197,12 +200,10 @@ def evidence_of(fault: Fault, spread: float) -> str:
     """Return size and standard deviation of a fault as text."""
     size = fault.size
     if fault.kind == "softer":
-        k = fault.cause.rpartition(".")[2]
-        low, high = max(size - 2.0 * spread, 0.0), size + 2.0 * spread
-        return f"{k} {100.0 * size:.0f} % lower ({100.0 * low:.0f} to {100.0 * high:.0f})"
+        part, low, high = fault.cause.rpartition(".")[2], max(size - 2.0 * spread, 0.0), size + 2.0 * spread
+        return f"{part} {100.0 * size:.0f} % lower ({100.0 * low:.0f} to {100.0 * high:.0f})"
     if fault.is_load:
-        unit = "kg" if fault.cause == "tip.payload" else "kg/m"
-        return f"by {size:.2g} {unit} (+- {max(spread, 0.1):.1g})"
+        return f"by {size:.2g} {'kg' if fault.cause == 'tip.payload' else 'kg/m'} (+- {max(spread, 0.1):.1g})"
     if fault.kind == "late":
         return f"by {1e3 * size:.0f} ms (+- {max(1e3 * spread, 1.0):.0f})"
     if fault.channel.startswith("cylinder_force"):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -23,34 +23,22 @@ SLOWEST, FASTEST = 1e-4, 3e-3  # m/s, rates of creeping: above noise, and below 
 CREPT = 4e-3  # m, least change of length for an alarm: a softening oil spring changes it by less
 
 
-class Creep(NamedTuple):
-    """Creeping of a cylinder since `onset` (ns): mean rate (m/s) and change of length (m), positive if it extends.
-
-    is_even : True if it is even in the newest window, not a few short moves.
-    """
-
-    onset: int
-    rate: float
-    change: float
-    is_even: bool
-
-
 class CreepMonitor:
     """Monitor of mean lengths and angles, one second after the other.
 
     Attributes
     ----------
-    creeping : dict of int to Creep
-        By cylinder, from 0.
+    creeping : dict of int to int
+        By cylinder (from 0) that creeps, since when (ns).
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._scene, self.creeping = scene, dict[int, Creep]()
+        self._scene, self.creeping = scene, dict[int, int]()
         self._seconds: deque[tuple[int, Array]] = deque(maxlen=SPAN)
         self._alarms: dict[int, Alarm] = {}  # by cylinder
 
     def take(self, stamp: int, block: Any) -> list[Alarm]:
-        """Take the samples of a second that begins at a stamp (ns); return the alarms that begin or end."""
+        """Take the samples of a second that begins at a stamp (ns); return the alarms that end or begin."""
         if self._seconds and stamp - self._seconds[-1][0] != SECOND:
             self._seconds.clear()
         count, codes = len(self._scene.joints), list(Stream)
@@ -58,30 +46,27 @@ class CreepMonitor:
             means_of(block.values[block.streams == codes.index(stream), :count]) for stream in (Stream.STROKES, Stream.ANGLES)
         )
         self._seconds.append((stamp, np.stack([lengths, strokes_of_angles(self._scene, angles)])))
+        begun = self._begun(stamp + SECOND)
+        ended = [replace(self._alarms.pop(i), until=stamp) for i in [*self._alarms] if i not in self.creeping]
+        self._alarms |= begun
+        return [*ended, *begun.values()]
+
+    def _begun(self, now: int) -> dict[int, Alarm]:
+        """Note which cylinders creep up to a stamp (ns); return the alarms of those that are even in the newest window."""
+        before, self.creeping, begun = self.creeping, {}, dict[int, Alarm]()
         if len(self._seconds) < SPAN:
-            self.creeping.clear()
-            return self._news(stamp)
+            return begun
         seconds = np.array([each for _, each in self._seconds])
-        parts = seconds.reshape(PARTS, -1, 2, count).mean(axis=1)
+        parts = seconds.reshape(PARTS, -1, *seconds.shape[1:]).mean(axis=1)
         rates = np.diff(parts[:, 0], axis=0) * PARTS / SPAN
         rate, by_angle = (parts[-1] - parts[0]) / (SPAN - SPAN / PARTS)
         is_slow = (np.abs(rate) > SLOWEST) & (np.abs(rate) < FASTEST) & (np.abs(by_angle - rate) < UNEVEN * np.abs(rate))
         is_slow &= (np.abs(np.diff(seconds[:, 0], axis=0) - rate) < UNEVEN * np.abs(rate) + SWING).all(axis=0)
         is_even = (np.abs(rates - rate) < UNEVEN * np.abs(rate)).all(axis=0)
-        for i in range(count):
-            old = self.creeping.pop(i, None)
-            if is_slow[i] and (is_even[i] or old is not None):
-                onset = self._seconds[0][0] if old is None else old.onset
-                change = float(rate[i]) * (stamp + SECOND - onset) / SECOND
-                self.creeping[i] = Creep(onset, float(rate[i]), change, bool(is_even[i]))
-        return self._news(stamp)
-
-    def _news(self, stamp: int) -> list[Alarm]:
-        gone = [i for i in self._alarms if i not in self.creeping]
-        news = [replace(self._alarms.pop(i), until=stamp) for i in gone]
-        for i, each in self.creeping.items():
-            if abs(each.change) >= CREPT and each.is_even and i not in self._alarms:
-                name, told = f"cylinder_{i + 1}", f"by {1e3 * each.rate:+.2g} mm/s, {1e3 * each.change:+.2g} mm up to now"
-                self._alarms[i] = Alarm(name, "creeps", each.onset, None, f"{name}.drive", told)
-                news.append(self._alarms[i])
-        return news
+        for i in np.flatnonzero(is_slow & (is_even | np.isin(np.arange(len(rate)), [*before]))).tolist():
+            onset = self.creeping[i] = before.get(i, self._seconds[0][0])
+            change = float(rate[i]) * (now - onset) / SECOND
+            if abs(change) >= CREPT and is_even[i] and i not in self._alarms:
+                name, told = f"cylinder_{i + 1}", f"by {1e3 * rate[i]:+.2g} mm/s, {1e3 * change:+.2g} mm up to now"
+                begun[i] = Alarm(name, "creeps", onset, None, f"{name}.drive", told)
+        return begun

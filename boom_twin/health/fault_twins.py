@@ -38,9 +38,7 @@ from .causes import (
 from .creep import SPAN, CreepMonitor
 from .sensor_check import Flags
 
-SIZES = 0.4, 0.7, 1.0, 1.4, 1.8  # trial sizes over the hypothesised size, to estimate the size of a named fault
-LAG_SIZES = tuple(0.25 * step for step in range(1, 11))  # the same of a lag, whose likelihood is no parabola further away
-LARGER = 1.4  # ratio of each further trial size to the one before, while the largest explains most
+RATIO = 1.4  # of successive trial sizes of a named fault
 IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
 CAME_BACK = 0.3  # remaining share of a zero's change, below which the fault has ended
 SPACING = 18_000_000  # ns, least time between samples of a stream: 50 Hz suffice for all motion of the boom
@@ -206,7 +204,7 @@ class FaultTwins:
 
     def _decide_anew(self) -> None:
         """Discard all evidence of faults."""
-        self._decision, self._age = Evidence(self._faults, self._odds), 0
+        self._decision, self._age = Evidence(self._scene, self._faults, self._odds), 0
         self._evidence = np.array([twin.evidence for twin in self._twins])
 
     def _made(self, each: Hypothesis) -> Follower:
@@ -250,21 +248,19 @@ class FaultTwins:
         A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show.
         """
         fault = self._faults[verdict.place]
-        if fault.cause.startswith("cylinder_") and fault.kind == "softer" and fault not in self._named:
-            if int(fault.channel.removeprefix("cylinder_")) - 1 in self._creep.creeping:
-                self._decide_anew()
-            if stamp - verdict.onset < SPAN * SECOND:
-                return []
         if fault in self._named:
             return self._ended(fault, verdict.onset)
-        sized, spread = self._sized(fault, verdict.onset)
-        spread = math.hypot(spread, usual_size(self._scene, fault))
-        if abs(sized.size) < NormalDist().inv_cdf(0.5 + 0.5 * self._odds) * spread:
+        if fault.cause.startswith("cylinder_") and fault.kind == "softer":
+            creeps = int(fault.channel.removeprefix("cylinder_")) - 1 in self._creep.creeping
+            if creeps or stamp - verdict.onset < SPAN * SECOND:
+                return []
+        if (found := self._sized(fault, verdict.onset)) is None:
             self._decide_anew()
             return []
+        sized, spread, onset = found
         ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
         evidence = evidence_of(sized, spread) if fault.is_told else ""
-        alarm = Alarm(fault.channel, fault.kind, verdict.onset, None, fault.cause, evidence, ranked)
+        alarm = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
         self._named[sized] = alarm
         self._begin()
         return [alarm] if fault.is_told else []
@@ -285,34 +281,52 @@ class FaultTwins:
                     return fault
         return None
 
-    def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float]:
-        """Return a fault with its most likely size, and the standard deviation, by twins over the recent seconds."""
-        if fault.kind == "off":
-            return self._change_of_zero(fault, onset)
-        tried = [size * fault.size for size in (LAG_SIZES if fault.kind == "late" else SIZES)]
-        totals = [self._total(fault._replace(size=size), onset) for size in tried]
-        while totals[-1] > max(totals[:-1]):
-            tried.append(LARGER * tried[-1])
-            totals.append(self._total(fault._replace(size=tried[-1]), onset))
-        sizes = np.array(tried)
-        best = min(max(int(np.argmax(totals)), 1), len(sizes) - 2)
-        near = slice(best - 1, best + 2)
-        curve, slope, _ = np.polyfit(sizes[near] - sizes[best], totals[near], 2)  # a log likelihood is a parabola at its top
-        if curve >= 0.0:
-            return fault._replace(size=float(sizes[int(np.argmax(totals))])), float(sizes[1] - sizes[0])
-        size = float(np.clip(sizes[best] - 0.5 * slope / curve, sizes[0], sizes[-1]))
-        return fault._replace(size=size), float((-2.0 * TEMPER * curve) ** -0.5)
+    def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float, int] | None:
+        """Return a fault of the most likely size, its standard deviation, and its most likely onset, not before `onset` (ns).
 
-    def _total(self, fault: Fault, onset: int) -> float:
-        """Return the log likelihood of the recent seconds since the onset; `IMPOSSIBLE` for an impossible boom."""
-        start = now = 0.0
+        Twins of larger and smaller sizes follow the recent seconds until the likelihood falls on both sides. None if the
+        size is not surely larger than the largest that a healthy boom seems to have.
+        """
+        sure = math.log(self._odds / (1.0 - self._odds))
+        if fault.kind == "off":
+            changed, spread = self._change_of_zero(fault, onset)
+            return (changed, spread, onset) if 0.5 * (changed.size / spread) ** 2 > sure else None
+        usual = usual_size(self._scene, fault)
+        least = NormalDist().inv_cdf(0.5 + 0.5 * self._odds) * usual
+        healthy = self._course(fault._replace(size=least), onset)
+
+        def gained(size: float) -> Array:
+            """Return the gain of a size by onset: the sum of those of the seconds from there."""
+            gains = self._course(fault._replace(size=size), onset) - healthy
+            return np.asarray(gains[::-1].cumsum()[::-1])
+
+        sizes = [fault.size / RATIO, fault.size]
+        gains = [gained(size) for size in sizes]
+        while gains[-1].max() > gains[-2].max():
+            sizes.append(RATIO * sizes[-1])
+            gains.append(gained(sizes[-1]))
+        while gains[0].max() > gains[1].max() and sizes[0] > least:
+            sizes.insert(0, sizes[0] / RATIO)
+            gains.insert(0, gained(sizes[0]))
+        best = int(np.argmax([each.max() for each in gains]))
+        if best == 0 or TEMPER * gains[best].max() < sure:
+            return None
+        first, ratios = int(gains[best].argmax()), np.array(sizes[best - 1 : best + 2]) / sizes[best]
+        curve, slope, _ = np.polyfit(ratios - 1.0, [each[first] for each in gains[best - 1 : best + 2]], 2)
+        shift, spread = np.clip(-0.5 * slope / curve, ratios[0] - 1.0, ratios[2] - 1.0), (-2.0 * TEMPER * curve) ** -0.5
+        sized = fault._replace(size=float(sizes[best] * (1.0 + shift)))
+        return sized, math.hypot(sizes[best] * spread, usual), onset + first * SECOND
+
+    def _course(self, fault: Fault, onset: int) -> Array:
+        """Return the log likelihood of each recent second since the onset; `IMPOSSIBLE` for an impossible boom."""
+        total, found = 0.0, list[float]()
         try:
             for stamp, twin in self._repeated(fault):
-                now = twin.evidence
-                start = now if stamp < onset else start
+                found += [twin.evidence - total] * (stamp >= onset)
+                total = twin.evidence
         except BoomTwinError:
-            return IMPOSSIBLE
-        return now - start
+            return np.full(sum(second.stamp >= onset for second in self._recent), IMPOSSIBLE)
+        return np.array(found)
 
     def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float]:
         """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), and the standard deviation."""

@@ -56,12 +56,16 @@ SENSOR_FAILS = (":stuck", ":noisy:5", ":spikes:0.03", ":spikes:0.02", ":dropout:
 """Ends of faults that the readings of a sensor show by themselves."""
 CAUSES = (
     "cylinder_{i}.k:softer:{share}", "cylinder_{i}.k:softer:{share}@15+4", "cylinder_{i}.k:softer:{share}@0",
-    "section_{i}.EI:softer:{share}", "section_{i}.EI:softer:{share}@0", "tip.payload:more:20", "tip.payload:less:20",
-    "joint_{i}.sensor:bias:0.0035", "joint_{i}.sensor:bias:0.0052@15+30", "cylinder_{i}.sensor:bias:0.0007",
-    "cylinder_{i}.sensor:bias:0.003@15+30", "cylinder_force_{i}.sensor:bias:10000@15+5", "joint_angles.delay:late:0.02@0",
+    "section_{i}.EI:softer:{share}@15+4", "section_{i}.EI:softer:{share}@0", "tip.payload:more:20", "tip.payload:less:20",
+    "line_fill:more:3@15+2", "joint_{i}.sensor:bias:0.0035", "joint_{i}.sensor:bias:0.0052@15+30",
+    "cylinder_{i}.sensor:bias:0.0007", "cylinder_{i}.sensor:bias:0.003@15+30", "cylinder_force_{i}.sensor:bias:10000@15+5",
+    "{stream}.delay:late:0.02@0", "cylinder_{i}.k:softer:{share} joint_{j}.sensor:bias:0.0035@30",
+    "tip.payload:more:20 section_{j}.EI:softer:{share}@30+4", "cylinder_{i}.k:softer:{share}@10..35",
+    "section_{i}.EI:softer:{share}@10+4..35", "tip.payload:more:20@10..35", "joint_{i}.sensor:bias:0.0035@10..35",
 )  # fmt: skip
 """Faults whose cause is named, from `ONSET` on where they say no other time; the share that is lost is drawn."""
 NEED_FORCES = ("cylinder_force", "tip.payload")
+LATE = ("joint_angles", "tip_imu", "cylinder_forces", "cylinder_strokes")  # streams of which one is late
 
 
 def row_of(number: int, causes: bool = False) -> dict[str, Any]:
@@ -71,17 +75,22 @@ def row_of(number: int, causes: bool = False) -> dict[str, Any]:
         scene = with_parameters(scene, {"tip.payload": 30.0})
     kind, i = str(rng.choice(KINDS)), int(rng.integers(1, 5))
     words = str(rng.choice(CAUSES if causes else FAULTS)) if number % 2 else ""
-    share = round(float(np.random.default_rng([number, 36]).uniform(0.2, 0.4)), 2)
-    named = words.format(i=i, share=share) + ("" if "@" in words else f"@{ONSET:g}") if words else ""
+    more = np.random.default_rng([number, 36])
+    drawn = {"share": round(float(more.uniform(0.2, 0.4)), 2), "j": int(more.integers(1, 5)), "stream": str(more.choice(LATE))}
+    named = " ".join(each + ("" if "@" in each else f"@{ONSET:g}") for each in words.format(i=i, **drawn).split())
     sensors, posture = Sensors(float(rng.choice([50.0, 100.0, 200.0]))), str(rng.choice(sorted(scene.postures)))
-    has_all, rig = causes or words.startswith(NEED_FORCES), int(rng.integers(3))
+    has_all, rig = words.startswith(NEED_FORCES) and not causes, int(rng.integers(3))
     streams = ("imu", "forces")[: 2 if has_all else int(rng.integers(3))]
+    if causes:
+        asked = {"imu": "EI" in words or "tip_imu" in named, "forces": "force" in named}
+        streams = tuple(name for name, share in (("imu", 0.7), ("forces", 0.6)) if more.random() < share or asked[name])
     loads = []
     if kind in ("pump", "both"):
         loads.append(PumpLoad(float(rng.uniform(0.2, 0.6)), float(np.exp(rng.uniform(np.log(30.0), np.log(250.0)))), onset=2.0))
     if kind in ("wind", "both"):
         loads.append(WindLoad(float(rng.uniform(10.0, 40.0))))
-    faults = [parse(named)] if named else []
+    late = named.partition(".delay:late:")[0] if causes else ""
+    faults = [] if late in LATE else [parse(each) for each in named.split()]
     boom, changing = changes(wrong_by(scene, 0.02, rig) if rig else scene, faults)
     programme = random_programme(scene, posture, DURATION * (FASTER if kind == "fast" else 1.0), number)
     if kind == "fast":
@@ -98,6 +107,10 @@ def row_of(number: int, causes: bool = False) -> dict[str, Any]:
     samples = samples_in_rows(
         seen.stamps, {stream: each for stream, each in rows.items() if each is not None}, seen.angle_stamps
     )
+    if late in LATE:
+        by = round(float(named.rpartition(":")[2].partition("@")[0]) / NANO)
+        moved = (replace(each, stamp=each.stamp + by) if each.stream == late else each for each in samples)
+        samples = sorted(moved, key=lambda each: each.stamp)
     for health in twin.take(block_of(samples, len(scene.joints))).health.values():
         alarms.take(health)
     found = []
@@ -126,19 +139,21 @@ def counts(rows: list[dict[str, Any]]) -> dict[str, int]:
 
 
 def named_in(row: dict[str, Any]) -> tuple[set[str], bool]:
-    """Return the causes that the alarms of a row name, and whether the true one is among them.
+    """Return the causes that the alarms of a row name wrongly, and whether all true ones are named.
 
     A stroke transducer that is off is named as the sensors of its joint.
     """
-    true, named = row["fault"].partition(":")[0], {cause for *_, cause in row["alarms"] if cause}
-    return named, bool(named & {true, true.replace("cylinder_", "joint_")})
+    named = {cause for *_, cause in row["alarms"] if cause}
+    true = [{each.partition(":")[0]} for each in row["fault"].split()]
+    true = [each | {name.replace("cylinder_", "joint_") for name in each if name.endswith("sensor")} for each in true]
+    return named.difference(*true), all(named & each for each in true)
 
 
 def causes_named(rows: list[dict[str, Any]]) -> dict[str, int]:
-    """Return how many healthy and faulty sessions there are, and in how many a cause is named, and the right one."""
+    """Return how many healthy and faulty sessions there are, in how many a wrong cause is named, and all right ones."""
     healthy, faulty = ([named_in(row) for row in rows if bool(row["words"]) is each] for each in (False, True))
-    found = {"healthy": len(healthy), "healthy named": sum(bool(named) for named, _ in healthy), "faulty": len(faulty)}
-    return found | {"faulty named": sum(bool(named) for named, _ in faulty), "right": sum(right for _, right in faulty)}
+    found = {"healthy": len(healthy), "healthy named": sum(bool(wrong) for wrong, _ in healthy), "faulty": len(faulty)}
+    return found | {"wrong": sum(bool(wrong) for wrong, _ in faulty), "right": sum(right for _, right in faulty)}
 
 
 def table(rows: list[dict[str, Any]]) -> None:
@@ -155,9 +170,8 @@ def table(rows: list[dict[str, Any]]) -> None:
         told = told or (", told in 0" if is_fault else "")
         found = [named_in(row) for row in own]
         right = sum(is_right for _, is_right in found)
-        told += f", a cause named in {sum(bool(named) for named, _ in found)}" + (
-            f", the true one in {right}" if is_fault else ""
-        )
+        told += f", a wrong cause named in {sum(bool(wrong) for wrong, _ in found)}"
+        told += f", the true ones in {right}" if is_fault else ""
         print(f"{name}: {len(own)} sessions{told}, {'too early' if is_fault else 'with an alarm'} in {before}")
 
 
