@@ -71,6 +71,14 @@ def test_a_sound_session_and_an_offset_are_no_wiring() -> None:
     assert {alarm.kind for _, alarm in run(offset).states()} == {"deviation"}
 
 
+def test_an_inclinometer_that_a_gyro_corrects_is_checked() -> None:
+    """At the root of section 1 an inclinometer reads what an encoder reads."""
+    reversed_3 = rewired(Stream.ANGLES, lambda v: v * [1, 1, -1, 1], 6.0)
+    for samples, wrong in ((session(6.0), set()), (reversed_3, {"joint_3"})):
+        twin = Twin(load_scene(), mounts=("root_compensated", None, None, None), health=True)
+        assert {alarm.channel for time, alarm in run(samples, twin=twin).states() if time > 4.0} == wrong
+
+
 def test_an_imu_elsewhere_is_checked_at_its_place() -> None:
     """The readings of the tip IMU, as those of another one at the tip; it is turned, by the mapping or against it."""
     turn = np.exp(-0.52j)
