@@ -23,8 +23,11 @@ def packets(source):
     while True:
         try:
             found = json.loads(source.recv(65_536))
-        except json.JSONDecodeError as error:
+        except ValueError as error:
             print(f"left out: no JSON ({error})")
+            continue
+        if not isinstance(found, dict):
+            print(f"left out: {found!r} is no object")
             continue
         if "end" in found:
             return
@@ -41,10 +44,10 @@ def run(source, scene, out, page_port=None):
                 stamp_ns = readings.pop("stamp_ns", None)
                 try:
                     report = page.update(readings, stamp_ns=stamp_ns)
+                    session.write(readings, stamp_ns=stamp_ns)
                 except UsageError as error:
                     print(f"left out: {error}")
                     continue
-                session.write(readings, stamp_ns=stamp_ns)
                 last = last if report.prediction is None else report
         except KeyboardInterrupt:
             print("stopped")

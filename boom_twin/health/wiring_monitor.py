@@ -6,6 +6,7 @@ taken `DELAY` later, so a live node and a replay give it with the same sample.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
@@ -17,6 +18,7 @@ from ..scene.schema import Scene
 from ..types import SENSORS, Alarm, Array, Mount, Place, Ranked, Stream, StrokeReading, channels_of, streams_of
 from ..wiring.check import Checked, channel_name, check, likely
 from ..wiring.readings import Channel, RestModel, Series, Window, is_checked
+from .alarms import UNKNOWN
 from .blocks import Block, means_of
 
 KIND = "wiring"  # kind of all its alarms
@@ -169,7 +171,9 @@ class WiringMonitor:
             if is_wrong and (name not in self._last or (verdict.is_sure and name not in self._sure)):
                 cause = f"{name}.sensor"
                 since = self._last[name].since if name in self._last else self._blocks[0][0]
-                self._last[name] = Alarm(name, KIND, since, None, cause, likely(verdict), (Ranked(cause, 1.0, ()),))
+                chance = 1.0 / (1.0 + math.exp(-verdict.margin))  # posterior beside the next way to read it
+                ranked = tuple(Ranked(*each, ()) for each in ((cause, chance), (UNKNOWN, 1.0 - chance)))
+                self._last[name] = Alarm(name, KIND, since, None, cause, likely(verdict), ranked)
                 self._sure |= {name} if verdict.is_sure else set()
                 news.append(self._last[name])
         return [*news, *self._ended(end)]

@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError, listed
-from ..types import SENSORS, Stream, sensor_kind, stream_of
+from ..types import NUMBERED_SIDE, SENSORS, Stream, sensor_kind, stream_of
 from .topic_table import (
     TYPES,
     InputTopic,
@@ -74,7 +74,9 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     values = _merged(usual_values, document or {})
     faults = _role_faults(values, usual_values)
     sensors = values.pop("sensors", None) or {}
-    absent = frozenset(channel for channel, given in sensors.items() if given == "none") if isinstance(sensors, dict) else ()
+    absent = frozenset[str]()
+    if isinstance(sensors, dict):
+        absent = frozenset(channel for channel, given in sensors.items() if given == "none")
     sensors, names, found = _sensors(sensors, values.get("drive") == "angles")
     faults += found
     if isinstance(values["inputs"], dict):
@@ -89,6 +91,8 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
         faults += _set_faults(names, joints, topics is not None and topics.is_shared)
     if faults or topics is None:
         raise UsageError(listed(source, faults))
+    if topics.has_pressures:  # a force needs both sides
+        absent |= {f"cylinder_force_{each.split('_')[1]}" for each in absent if NUMBERED_SIDE.fullmatch(each)}
     inputs = topics.inputs
     if topics.drive == "angles":
         inputs = {stream: topic for stream, topic in inputs.items() if stream is not Stream.STROKES}
@@ -246,5 +250,5 @@ def _input_faults(topics: Topics) -> Iterator[Fault]:
     drive, named = (Stream.ANGLES, "an angle") if topics.drive == "angles" else (Stream.STROKES, "a stroke")
     if delay := topics.inputs[drive].delay:
         bound = f"every output has the stamp of {named} sample, so the other streams' delays count against it"
-        others = "auto" if isnan(delay) else f"{-delay:g}"
-        yield Fault(f"inputs.{drive.value}.delay", delay, bound, f"Give the others {others} instead.")
+        given, others = ("auto", "auto") if isnan(delay) else (delay, f"{-delay:g}")
+        yield Fault(f"inputs.{drive.value}.delay", given, bound, f"Give the others {others} instead.")

@@ -241,7 +241,11 @@ class Topics(_Entry):
                 told = f"bore and rod have {len(topic.bore)} and {len(topic.rod)} entries, the scene has {len(oils)} cylinders"
                 raise UsageError(f"inputs.cylinder_pressures: {told}. Give one for each, m.")
             given = list(zip(topic.bore, topic.rod, strict=True))
-        areas = [(pi / 4 * bore**2, pi / 4 * (bore**2 - rod**2)) for bore, rod in filter(None, given) if rod < bore]
+            for number, (bore, rod) in enumerate(zip(topic.bore, topic.rod, strict=True), 1):
+                if rod >= bore:
+                    told = f"cylinder {number} has bore {bore:g} and rod {rod:g} m, and the rod must be thinner"
+                    raise UsageError(f"inputs.cylinder_pressures: {told}. Give the diameters, m.")
+        areas = [(pi / 4 * bore**2, pi / 4 * (bore**2 - rod**2)) for bore, rod in filter(None, given)]
         if len(areas) == len(oils):
             return topics.model_copy(update={"areas": tuple(areas)})
         if self.has_pressures:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
-from ..types import GIVE, SENSORS, Array, Stream
+from ..types import GIVE, SENSORS, Array, Mount, Stream
 from .readings import Channel, Expected, Table
 
 ANGLE_ERROR = math.radians(0.7)  # rad, zero error of an encoder and error of the scene
@@ -142,10 +142,16 @@ def declared_costs(
         readings = si(own, SENSORS[stream].units, table.values[:, table.names.index(own.name)])
         right, sigma = expected.forces[:, j], _force_error(expected, j)
         if stream is Stream.ANGLES:
-            right, sigma = expected.angles[own.absolute][:, j], np.array(ANGLE_ERROR)
+            right, sigma = expected.angles[_at_rest(own.absolute)][:, j], np.array(ANGLE_ERROR)
             readings = right + np.remainder(readings - right + math.pi, TAU) - math.pi
         costs.append(float(misfit(((readings - right) / sigma)[np.isfinite(readings)], weight)))
     return costs
+
+
+def _at_rest(mount: Mount | None) -> Mount | None:
+    """Return the mount of an inclinometer that is not compensated and reads the same at rest; None for an encoder."""
+    plain: dict[Mount | None, Mount] = {"root_compensated": "root", "head_compensated": "head"}
+    return plain.get(mount, mount)
 
 
 def _force_error(expected: Expected, j: int) -> Array:
@@ -168,11 +174,12 @@ def angle_cube(table: Table, declared: Sequence[Channel], expected: Expected, we
             tracks = np.array([si(channel, units, readings) for channel in own])
             before = name_cost(declared, j, name, table.names)
             for kind, angles in expected.angles.items():
-                cost = before + (ABSOLUTE if kind != base.absolute else 0.0)
+                mount = base.absolute if kind == _at_rest(base.absolute) else kind
+                cost = before + (ABSOLUTE if mount != base.absolute else 0.0)
                 for more, zeros, costs in _zeros(tracks - angles[is_read, j], kind is None, weight):
                     for channel, zero, misfits in zip(own, zeros.tolist(), costs.tolist(), strict=True):
                         size = channel.sign * channel.scale * units[channel.unit]
-                        moved = channel._replace(absolute=kind, zero=channel.zero + zero / size)
+                        moved = channel._replace(absolute=mount, zero=channel.zero + zero / size)
                         found.add(j, a, cost + more + misfits, moved, base)
     return found.cube()
 

@@ -46,6 +46,16 @@ def test_it_is_reported_and_not_used(case: str) -> None:
         np.testing.assert_allclose(tips(found)[800:], tips(right)[800:], atol=6e-3)
 
 
+def test_what_is_not_determined_is_not_almost_certain() -> None:
+    """All angles are those of a straight boom, so angles or strokes are wrong."""
+    found = run(rewired(Stream.ANGLES, lambda v: 0.0 * v, 8.0))
+    wired = [alarm for _, alarm in found.states() if alarm.kind == "wiring" and alarm.until is None]
+    assert any("perhaps" in alarm.evidence for alarm in wired)
+    for alarm in wired:
+        assert sum(each.probability for each in alarm.ranked) == pytest.approx(1.0)
+        assert ("perhaps" in alarm.evidence) == (alarm.ranked[0].probability < 0.999)
+
+
 def test_a_start_with_right_readings_ends_it() -> None:
     wrong, right = rewired(Stream.ANGLES, lambda v: v[SWAP_23], 6.0), session(8.0)
     later = wrong[-1].stamp - right[0].stamp + 60_000_000_000  # after a pause the boom starts from rest
@@ -59,6 +69,14 @@ def test_a_sound_session_and_an_offset_are_no_wiring() -> None:
     offset = rewired(Stream.ANGLES, lambda v: v + np.array([0.0, 0.04, 0.0, 0.0]), 12.0)
     assert not run(session(12.0)).told()
     assert {alarm.kind for _, alarm in run(offset).states()} == {"deviation"}
+
+
+def test_an_inclinometer_that_a_gyro_corrects_is_checked() -> None:
+    """At the root of section 1 an inclinometer reads what an encoder reads."""
+    reversed_3 = rewired(Stream.ANGLES, lambda v: v * [1, 1, -1, 1], 6.0)
+    for samples, wrong in ((session(6.0), set()), (reversed_3, {"joint_3"})):
+        twin = Twin(load_scene(), mounts=("root_compensated", None, None, None), health=True)
+        assert {alarm.channel for time, alarm in run(samples, twin=twin).states() if time > 4.0} == wrong
 
 
 def test_an_imu_elsewhere_is_checked_at_its_place() -> None:

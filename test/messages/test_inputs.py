@@ -102,6 +102,11 @@ def test_they_become_forces_positive_in_tension(tmp_path: Path) -> None:
     assert np.isnan(sample.values).tolist() == [False, False, False, True]
 
 
+def test_a_force_without_one_of_its_sides_is_no_fault(tmp_path: Path) -> None:
+    assert mapped(tmp_path, f"{MAPPING}  cylinder_3_rod: none\n").absent == {"cylinder_3_rod", "cylinder_force_3"}
+    assert mapped(tmp_path, "sensors: {cylinder_3_rod: none}").absent == {"cylinder_3_rod"}
+
+
 def test_their_noise_is_that_of_the_forces(tmp_path: Path) -> None:
     settings = Settings(pressure_sigma=2e4)
     assert mapped(tmp_path, MAPPING).noise_of(settings).force_sigma == pytest.approx(2e4 * hypot(PISTON[3], RING[3]))
@@ -116,6 +121,11 @@ def test_their_noise_is_that_of_the_forces(tmp_path: Path) -> None:
             "oil: {bore, rod, ..}` to each cylinder of the scene, or bore and rod",
         ),
         ("inputs: {cylinder_pressures: {bore: [0.1], rod: [0.05]}}", "1 and 1 entries, the scene has 4 cylinders"),
+        (
+            "inputs: {cylinder_pressures: {bore: [0.1, 0.1, 0.1, 0.1], rod: [0.05, 0.1, 0.05, 0.05]}}",
+            "cylinder 2 has bore 0.1 and rod 0.1 m, and the rod must be thinner",
+        ),
+        ("inputs: {cylinder_strokes: {delay: auto}}", "inputs.cylinder_strokes.delay = 'auto': every output has the stamp"),
         ("inputs: {tip_imu: {bore: [0.1]}}", "only cylinder_pressures has it"),
         ("sensors: {cylinder_5_cap: {unit: bar}}", "the scene has 4 joints"),
     ],
