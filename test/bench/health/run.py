@@ -109,7 +109,7 @@ def row_of(number: int, causes: bool = False) -> dict[str, Any]:
     )
     if late in LATE:
         by = round(float(named.rpartition(":")[2].partition("@")[0]) / NANO)
-        moved = (replace(each, stamp=each.stamp + by) if each.stream == late else each for each in samples)
+        moved = (replace(each, stamp=each.stamp + by) if each.stream.value == late else each for each in samples)
         samples = sorted(moved, key=lambda each: each.stamp)
     for health in twin.take(block_of(samples, len(scene.joints))).health.values():
         alarms.take(health)
