@@ -171,11 +171,11 @@ class HealthMonitor:
         for sensors in self._sensors.values():
             yield from (alarm for alarm in sensors.alarms if not self._wiring.explains(alarm))
         yield from self._wiring.alarms
-        yield from (alarm for alarm in self._lags.alarms if all(alarm.cause != each.cause for each in self._named))
+        yield from self._lags.alarms
         yield from () if self._load.alarm is None else (self._load.alarm,)
         for stream, deviations in self._deviations.items():
             yield from (alarm for alarm in deviations.alarms if not any(explains(each, stream, alarm) for each in self._named))
-        yield from self._named
+        yield from (each for each in self._named if all(each.cause != late.cause for late in self._lags.alarms))
 
     def _judge(self, block: Block) -> list[Alarm]:
         """Return the alarms that a block begins or ends."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from boom_twin import Sample, Stream
+from boom_twin import Sample, Settings, Stream, load_scene
 from boom_twin.health.blocks import BLOCK as BLOCK_TIME
 from boom_twin.health.blocks import Block, MeasuredRows
 from boom_twin.health.lag_monitor import LagMonitor
+from boom_twin.health.monitor import HealthMonitor
 from boom_twin.health.stream_readings import StreamReadings, StreamSurvey
-from boom_twin.types import Alarm, Array
+from boom_twin.types import NO_PLACES, Alarm, Array, StrokeReading, channels_of
 
 from .recorded import run, session
 
@@ -110,6 +113,15 @@ def test_a_boom_at_rest_has_no_lag() -> None:
         expected = 1.0 + np.cumsum(rng.normal(0.0, 1e-5, (RATE, 2)), axis=0)
         readings = {Stream.ANGLES: block_of(1.0 + rng.normal(0.0, 2e-4, (RATE, 2)), expected, number)}
         assert monitor.take(readings, {Stream.ANGLES: NONE}, Block(number)) == []
+
+
+def test_a_lag_that_fault_twins_name_too_is_one_alarm() -> None:
+    streams = channels_of(4)
+    monitor = HealthMonitor(load_scene(), Settings(), (None,) * 4, (), streams, StrokeReading.LENGTH, NO_PLACES)
+    judged(monitor._lags, 0.03, 40.0)
+    (alarm,) = monitor._lags.alarms
+    monitor.fault_twins = SimpleNamespace(alarms=[replace(alarm, since=0)])  # type: ignore[assignment]
+    assert list(monitor._lasting()) == [alarm]
 
 
 def late(seconds: float, lag: float) -> tuple[Sample, ...]:
