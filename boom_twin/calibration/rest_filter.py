@@ -45,7 +45,7 @@ def note_drives(t, boom, live, work, p, f, stamps, lengths, gravity, row, drives
             return status
         opened[k] = False
         for i in range(lengths.shape[1]):
-            opened[k] |= f.is_open[i] == 1
+            opened[k] |= f.is_open[PREDICTION, i] == 1
             drives[k, i] = f.mean[PREDICTION, drive_place(p) + i]
     return OK
 

@@ -6,22 +6,8 @@ import math
 
 from ..kernels.jit import inner
 from .kalman import DRIVE_TIME
-from .mixture import copy_model
-from .states import (
-    ALL_BURST,
-    ALL_OPEN,
-    ALL_OPEN_BURST,
-    ALL_VALVES,
-    BURST,
-    ESTIMATE,
-    FED,
-    OPEN,
-    PREDICTION,
-    VALVES,
-    all_states,
-    drive_place,
-    force_place,
-)
+from .mixture import copy_model, models_of
+from .states import BURST, ESTIMATE, FED, OPEN, PREDICTION, VALVES, drive_place, force_place
 
 LEARN_LOAD = 3.0  # s, in which the variance of the fast load is learnt
 SURPRISE = 9.0  # largest square of a value that counts in the learnt variance, in terms of the present variance
@@ -35,25 +21,26 @@ UNEVEN = 0.5  # largest relative change of the sampling interval within a third 
 
 
 @inner
-def watch_valves(p, f, h, size):
-    """Set valves open or closed by the rates of their drives in the model in which all are open."""
+def watch_valves(p, f, h, mixture, size):
+    """Set valves of a mixture open or closed by the rates of their drives in its likeliest model in which all are open."""
     n, drive, opened = p.drives.shape[0], drive_place(p), False
+    first, count = models_of(mixture)
+    moving, likely, is_open, still = first + OPEN, 0.0, f.is_open[mixture], f.still[mixture]
+    for k in range(first + OPEN, first + count, 2):
+        likely += f.chances[k]
+        moving = k if f.chances[k] > f.chances[moving] else moving
     for i in range(n):
         at = drive + n + i
-        deviation = abs(f.x[OPEN, at]) / math.sqrt(max(f.p[OPEN, at, at], 1e-300))
-        f.still[i] = f.still[i] + h if deviation < SHUT else 0.0
-        if deviation > OPENED and f.chances[OPEN] > 0.5:
-            if f.is_open[i] == 0:
-                opened = True
-                f.is_open[i] = 1
-        elif f.still[i] > SHUT_TIME:
-            f.is_open[i] = 0
+        deviation = abs(f.x[moving, at]) / math.sqrt(max(f.p[moving, at, at], 1e-300))
+        still[i] = still[i] + h if deviation < SHUT else 0.0
+        if deviation > OPENED and likely > 0.5:
+            opened |= is_open[i] == 0
+            is_open[i] = 1
+        elif still[i] > SHUT_TIME:
+            is_open[i] = 0
     if opened:
-        copy_model(f, OPEN, VALVES, size)
-        copy_model(f, OPEN, BURST, size)
-        if f.status[FED] == 1:
-            copy_model(f, ALL_OPEN, ALL_VALVES, all_states(p))
-            copy_model(f, ALL_OPEN_BURST, ALL_BURST, all_states(p))
+        for k in (VALVES, BURST):
+            copy_model(f, first + (k + OPEN if k + OPEN < count else OPEN), first + k, size)
 
 
 @inner
@@ -65,7 +52,7 @@ def learn_jerk(p, f, h):
     """
     n = p.drives.shape[0]
     for i in range(n):
-        if f.is_open[i] == 0 and not (p.reads_angle and p.sways[i]):
+        if f.is_open[PREDICTION, i] == 0 and not (p.reads_angle and p.sways[i]):
             reach2 = p.readings[2 + i, n] ** 2 + p.readings[2 + i, n + 1] ** 2
             f.jerk[i] = min(2.0 / DRIVE_TIME * OPENING * OPENING / max(reach2, 1e-9), MOST_JERK)
             continue

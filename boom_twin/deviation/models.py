@@ -17,8 +17,8 @@ estimate adds zeros of IMU, angle sensors and force sensors, and errors of furth
 A closed valve locks the oil, so its drive stands still: that is a reading of rate zero. Three models interact (H. Blom and
 Y. Bar-Shalom, IEEE Trans. Automat. Control 33 (1988), 780-783): valves as they are believed to be; all valves open; valves as
 believed under a load that has just come. Where the second explains the lengths best, valves whose rates differ from zero are
-believed open, until they stand still. The estimate has the readings of all sensors in each, and a fourth: open valves under a
-load that has just come. Lengths alone do not tell these two apart where both begin at once.
+believed open, until they stand still. The estimate has the readings of all sensors, valves of its own, and a fourth model, of
+open valves under a load that has just come: lengths alone do not tell these two apart.
 
 How far a drive's acceleration changes, and how large the fast load is, is learnt: the variance that a state is expected to have
 goes to the one that it shows (expectation maximisation, one step a sample).
@@ -84,7 +84,7 @@ def start_models(p, f, speed, swing):
         x[drive + i] = p.drives[i]
         covariance[drive + i, drive + i] = f.noise.length2 * first_scale(p, i)
         covariance[drive + n + i, drive + n + i] = CLOSED_RATE * CLOSED_RATE + speed * speed
-        f.jerk[i], f.is_open[i], f.still[i] = JERK, 1 if speed > 0.0 else 0, 0.0
+        f.jerk[i], f.is_open[PREDICTION, i], f.still[PREDICTION, i] = JERK, 1 if speed > 0.0 else 0, 0.0
         f.length2[i], f.pulls[i] = noise.length2, p.pulled[i]
         f.before[i, 0] = f.before[i, 1] = f.before[i, 2] = math.nan
     copy_model(f, VALVES, OPEN, size)
@@ -124,9 +124,8 @@ def step_models(p, f, h, y):
                     transit(p, f, k, states_of(p, mixture), h / steps, f.load2[mixture], least2)
         for mixture in range(mixtures):
             first, count = models_of(mixture)
-            for k in range(first, first + count):
-                if (k - first) % 2 != OPEN:
-                    hold_still(p, f, k, states_of(p, mixture))
+            for k in range(first, first + count, 2):  # not those in which all are open
+                hold_still(p, f, k, f.is_open[mixture], states_of(p, mixture))
     note_innovations(p, f, y)
     evidence = 0.0
     for mixture in range(mixtures):
@@ -139,7 +138,8 @@ def step_models(p, f, h, y):
         leave_contradiction(p, f, size)
     f.evidence[0] += evidence
     if h > 0.0:
-        watch_valves(p, f, h, size)
+        for mixture in range(mixtures):
+            watch_valves(p, f, h, mixture, states_of(p, mixture))
         learn_jerk(p, f, h)
         learn_load(p, f, h)
     if f.status[FED] == 0:
@@ -153,11 +153,11 @@ def states_of(p, mixture):
 
 
 @inner
-def hold_still(p, f, k, size):
+def hold_still(p, f, k, is_open, size):
     """Correct model `k` by readings of zero rate and acceleration of drives behind closed valves."""
     n, drive = p.drives.shape[0], drive_place(p)
     for i in range(n):
-        if f.is_open[i] == 0 and not f.deaf[i]:
+        if is_open[i] == 0 and not f.deaf[i]:
             for order in (1, 2):
                 at = drive + order * n + i
                 clear(f.row, size)
@@ -221,6 +221,8 @@ def follow_prediction(p, f):
     """Set the estimate to the prediction; the sensors' zeros are unknown then."""
     p.delayed[0] = 0
     size, every, n = zero_place(p), all_states(p), p.drives.shape[0]
+    for i in range(n):
+        f.is_open[ESTIMATE, i], f.still[ESTIMATE, i] = f.is_open[PREDICTION, i], f.still[PREDICTION, i]
     for k in range(ALL_VALVES, ALL_OPEN_BURST + 1):
         source = OPEN if k == ALL_OPEN_BURST else k - ALL_VALVES
         f.chances[k] = 0.0 if k == ALL_OPEN_BURST else f.chances[source]

@@ -237,13 +237,14 @@ class BoomPredictor:
         """
         f, first, n = self.filters, drive_place(self.posture), self.plan.joints
         for i in np.flatnonzero(strokes & ~f.deaf):
-            f.is_open[i] = 1
+            f.is_open[:, i] = 1
             for covariance in f.p:
                 covariance[first + i, first + i] += FAILED_WAY**2
                 covariance[first + n + i, first + n + i] += FAILED_RATE**2
         if (masked & ~f.masked).any() or (strokes != f.deaf).any():
             f.status[FED] = 0
         f.masked[:], f.deaf[:] = masked, strokes
+        f.apart[masked[:n] | strokes] = 0.0  # angle sensors are the first channels
 
     def doubt(self, channels: Collection[str]) -> None:
         """Allow a large drift of the zeros of these sensors: angles, forces, axes of the IMU."""

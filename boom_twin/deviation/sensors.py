@@ -15,7 +15,7 @@ from .states import ALL_OPEN_BURST, ALL_VALVES, ESTIMATE, FED, FED_STAMP, PREDIC
 
 INEXACT = 0.03  # error of the model's accelerations and rates of turn: share of their root mean square at the site
 LEARN_NOISE = 0.02  # weight of one reading in the learnt noise of its channel
-LEARN_RATIO = 0.005  # weight of one reading in the mean square of its channel's normalised innovations
+LEARN_RATIO = 0.005  # weight of one reading in means of its channel: square of normalised innovations, residuals of angles
 DOF = 4.0  # degrees of freedom of Student's t, the distribution of innovations of the estimate
 SLOW = 5_000_000_000  # ns for which the position of a point keeps the estimate, beyond other readings
 OLDEST = 0.1  # s, most that a reading may be late
@@ -72,8 +72,10 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         if lag >= 0:
             variance += add_lag(p, f, lag, f.row, f.rows[2])
         take_reading(p, f, c, residual, variance)
-        if channel.kind == READS_ANGLE and f.deaf[channel.index]:
-            replace_length(p, f, c, residual)
+        if channel.kind == READS_ANGLE:
+            f.apart[channel.index] += LEARN_RATIO * (residual - f.apart[channel.index])
+            if f.deaf[channel.index]:
+                replace_length(p, f, c, residual)
     weigh_models(f, ESTIMATE)
     mix(f, ESTIMATE, all_states(p))
     if lag >= 0:

@@ -41,12 +41,13 @@ class Filters(NamedTuple):
     x, p : (7, s), (7, s, s) states and covariances of the models. chances : (7,) of them, in each mixture one in all.
     mean, spread : (2, s), (2, s, s) of the mixtures. load2 : (2, 2) variances of the fast load, N^2, of prediction and
     estimate, along x and y.
-    jerk : (n,) m^2/s^5. is_open : (n,) 1 where a valve is believed open. still : (n,) s since its drive began to stand still.
+    jerk : (n,) m^2/s^5. is_open, still : (2, n) 1 where a valve is believed open, s since its drive began to stand still.
     status : (2,) whether the estimate has readings of its own, stamp of the newest of these.
     masked, deaf : (c,), (n,) measured channels that the estimate, and strokes that no model is to use. noise : variances.
     excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
     drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
     m^2. before, interval : (n, 3), (2,) the three lengths before (m); times between the newest two, and of `weights`, s.
+    apart : (n,) recent mean of what angle sensors read more than the lengths make of them, rad; 0 of sensors left out.
     lags, late : (streams,) by which stamps are late, as estimated, and by which samples arrived after their stamps at most, s.
     copies : (c,) places of late channels among the copies of one instant, -1 of others. instants : (DELAYED,) stamps of copies,
     see `delayed`.
@@ -83,6 +84,7 @@ class Filters(NamedTuple):
     interval: Array
     bends: Array
     sway2: Array
+    apart: Array
     lags: Array
     late: Array
     copies: NDArray[np.int64]
@@ -118,11 +120,11 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
     states = own + behind + DELAYED
     return Filters(
         x=np.zeros((7, states)), p=np.zeros((7, states, states)), chances=np.zeros(7), mean=np.zeros((2, states)),
-        spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
-        still=np.zeros(n), status=np.zeros(2, np.int64), masked=np.zeros(channels, np.bool_),
+        spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros((2, n), np.int64),
+        still=np.zeros((2, n)), status=np.zeros(2, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
-        sway2=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,
+        sway2=np.zeros(n), apart=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,
         late=np.zeros(len(Stream)), copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         places=np.zeros((own, 8 + n), np.int64), weights=np.zeros((own, 8 + n)), counts=np.zeros(own, np.int64),
         variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),

@@ -26,6 +26,7 @@ from .estimate_row import (
     VELOCITY_COVARIANCE,
 )
 from .estimate_row import TIP as TIP_AT
+from .kalman import ANGLE_ZERO
 from .models import step_models
 from .posture import WIDEST, linearise, locate
 from .rows import (
@@ -47,6 +48,7 @@ from .rows import (
 from .sensor_model import specific_force
 from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, drive_place, force_place, zero_place
 
+FAULT_CHANCE, FAULT = 0.01, 0.03  # that a sensor is off, and by how much as an angle of its joint, rad
 PATIENCE = 1_000_000_000  # ns without readings after which the estimate is the prediction again
 FOLLOW = np.bool_(True)  # of `linearise`, see `boom_twin.kernels.transfer.time_step.ANEW`
 ANGLE_STEP = 0.01  # rad that a joint turns by before the boom is linearised anew
@@ -86,7 +88,7 @@ def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
         if status != OK:
             return status
     if f.status[FED] == 1 and stamp - f.status[FED_STAMP] > PATIENCE:
-        f.status[FED] = 0
+        f.status[FED], f.apart[:] = 0, 0.0
     step_models(p, f, h, y)
     if not is_finite(p, f):
         return NOT_FINITE
@@ -264,6 +266,7 @@ def write_tip_estimate(p, f, results, out):
         out[VELOCITY + a] = results.tip[1, a] + difference(f.rows[3 + a], mean, expected, size)
         out[ACCELERATION + a] = results.tip[2, a] + difference(f.rows[6 + a], mean, expected, size)
     write_covariance(f, 0, size, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
+    add_doubt(p, f, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     write_covariance(f, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
     write_covariance(f, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
     for j in range(MODES):
@@ -274,6 +277,26 @@ def write_tip_estimate(p, f, results, out):
         fast, slow = load + a, load + 2 + a
         out[FORCE + a] = f.mean[ESTIMATE, fast] + f.mean[ESTIMATE, slow]
         out[FORCE_VARIANCE + a] = covariance[fast, fast] + 2.0 * covariance[fast, slow] + covariance[slow, slow]
+
+
+@inner
+def add_doubt(p, f, out):
+    """Add the variance by stroke transducers that are off to the upper triangle of the tip's covariance.
+
+    An angle sensor and the lengths differ because the angle's zero is off by ANGLE_ZERO, or either sensor by FAULT (rad,
+    normal, equal odds). The posterior probability that it is the transducer weighs the square of the tip's way by it.
+    """
+    n = p.drives.shape[0]
+    for i in range(n):
+        apart = f.apart[i] - (f.apart[i - 1] if i > 0 and p.absolute[i] else 0.0)
+        fault = FAULT_CHANCE / FAULT * math.exp(-0.5 * (apart / FAULT) ** 2)
+        usual = math.exp(-0.5 * (apart / ANGLE_ZERO) ** 2) / ANGLE_ZERO
+        share = fault / (usual + 2.0 * fault) * (apart / p.slope[i]) ** 2
+        at = 0
+        for a in range(3):
+            for b in range(a, 3):
+                out[at] += share * p.readings[2 + i, n + a] * p.readings[2 + i, n + b]
+                at += 1
 
 
 @inner

@@ -45,6 +45,21 @@ def test_it_is_what_a_twin_comes_to() -> None:
     assert np.sqrt(np.mean(estimates[2000:], axis=0)) == pytest.approx(stated.tip, rel=0.15)  # learnt noise adds to it
 
 
+@pytest.mark.parametrize(("off", "low", "high"), [(0.0, 0.0, 1e-3), (4e-3, 0.08, 0.2)])
+def test_a_transducer_that_an_angle_sensor_contradicts_is_stated(off: float, low: float, high: float) -> None:
+    """Cylinder 2 reads too much. The error is within what is stated, which is small without a contradiction."""
+    twin, rng, rest = Twin(SCENE), np.random.default_rng(2), statics(SCENE, strokes=ARCH)
+    strokes = rest.lengths + off * np.eye(4)[1]
+    for k in range(1000):
+        report = twin.update(Sample(Stream.STROKES, 5_000_000 * k, strokes + 2e-5 * rng.normal(size=4)))
+        twin.update(Sample(Stream.ANGLES, 5_000_000 * k, rest.joints + 1.745e-4 * rng.normal(size=4)))
+    assert report.estimate is not None
+    stated = np.sqrt(report.estimate.tip_covariance[[0, 3]])
+    assert low <= np.hypot(*stated) < high
+    assert (np.abs(report.estimate.tip[:2] - rest.tip) < 2.5 * stated).all()
+    assert np.hypot(*(statics(SCENE, lengths=strokes).tip - rest.tip)) < 1.6 * max(np.hypot(*stated), 1e-3)
+
+
 def test_the_command_states_every_selection_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = tmp_path / "one_posture.yaml"
     scene.write_text(re.sub(r"  (horizontal|high|low): .*\n", "", default_text()))
