@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from ..kernels.jit import inner
 from .rows import clear, difference, read, spread_of
-from .states import ALL_OPEN_BURST, ALL_VALVES, DELAYED, ESTIMATE, FED, PREDICTION, all_states, copy_place
+from .states import ALL_BURST, ALL_VALVES, DELAYED, ESTIMATE, FED, PREDICTION, all_states, copy_place
 
 FEWEST_INSTANTS = 4  # that must fit into `DELAYED` states; a late stream that would leave fewer is not copied
 NEAREST = 4e6  # ns from one instant to the next, at least: a tenth of the period of the fastest mode
@@ -93,7 +93,7 @@ def copy_reading(p, f, at, value):
     """Set state `at` of the estimate to the reading of `f.row`, predicted as `value`."""
     every = all_states(p)
     f.mean[PREDICTION, at] = value
-    for k in range(ALL_VALVES, ALL_OPEN_BURST + 1):
+    for k in range(ALL_VALVES, ALL_BURST + 1):
         copy_to(f, f.x[k], f.p[k], at, every)
     copy_to(f, f.mean[ESTIMATE], f.spread[ESTIMATE], at, every)
 

@@ -6,7 +6,7 @@ import math
 
 from ..kernels.jit import inner
 from .kalman import DRIVE_TIME
-from .mixture import copy_model, models_of
+from .mixture import copy_model, first_model
 from .states import BURST, ESTIMATE, FED, OPEN, PREDICTION, VALVES, drive_place, force_place
 
 LEARN_LOAD = 3.0  # s, in which the variance of the fast load is learnt
@@ -22,25 +22,22 @@ UNEVEN = 0.5  # largest relative change of the sampling interval within a third 
 
 @inner
 def watch_valves(p, f, h, mixture, size):
-    """Set valves of a mixture open or closed by the rates of their drives in its likeliest model in which all are open."""
+    """Set valves of a mixture open or closed by the rates of their drives in its model in which all are open."""
     n, drive, opened = p.drives.shape[0], drive_place(p), False
-    first, count = models_of(mixture)
-    moving, likely, is_open, still = first + OPEN, 0.0, f.is_open[mixture], f.still[mixture]
-    for k in range(first + OPEN, first + count, 2):
-        likely += f.chances[k]
-        moving = k if f.chances[k] > f.chances[moving] else moving
+    first, is_open, still = first_model(mixture), f.is_open[mixture], f.still[mixture]
+    moving = first + OPEN
     for i in range(n):
         at = drive + n + i
         deviation = abs(f.x[moving, at]) / math.sqrt(max(f.p[moving, at, at], 1e-300))
         still[i] = still[i] + h if deviation < SHUT else 0.0
-        if deviation > OPENED and likely > 0.5:
+        if deviation > OPENED and f.chances[moving] > 0.5:
             opened |= is_open[i] == 0
             is_open[i] = 1
         elif still[i] > SHUT_TIME:
             is_open[i] = 0
     if opened:
-        for k in (VALVES, BURST):
-            copy_model(f, first + (k + OPEN if k + OPEN < count else OPEN), first + k, size)
+        copy_model(f, moving, first + VALVES, size)
+        copy_model(f, moving, first + BURST, size)
 
 
 @inner

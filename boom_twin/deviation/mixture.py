@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner
-from .rows import clear
 from .states import ALL_VALVES, BURST, OPEN, PREDICTION, VALVES
 
+MODELS = BURST + 1  # of a mixture
 OPENS, CLOSES = 0.3, 1.0  # 1/s, rates at which valves open, and are closed again
 COMES, STAYS = 0.2, 1.0  # 1/s, rates at which a load comes, and is usual again
 
@@ -22,36 +22,29 @@ def copy_model(f, source, target, size):
 
 
 @inner
-def models_of(mixture):
-    """Return the first model of a mixture, and how many it has."""
-    return (VALVES, ALL_VALVES - VALVES) if mixture == PREDICTION else (ALL_VALVES, 4)
+def first_model(mixture):
+    """Return the first of the `MODELS` of a mixture."""
+    return VALVES if mixture == PREDICTION else ALL_VALVES
 
 
 @inner
 def interact(f, mixture, size, h):
-    """Mix the models of a mixture before a step of `h` (s): valves and load change independently of each other.
-
-    Without a model of open valves under a new load, one in which all are open stands for it.
-    """
-    first, count = models_of(mixture)
-    switch = f.switch
-    for source in range(count):
-        clear(switch[source], count)
-        turns = 1.0 - math.exp(-(CLOSES if source % 2 == OPEN else OPENS) * h)
-        changes = 1.0 - math.exp(-(STAYS if source >= BURST else COMES) * h)
-        for target in range(4):
-            valves = 1.0 - turns if source % 2 == target % 2 else turns
-            load = 1.0 - changes if source // 2 == target // 2 else changes
-            switch[source, target if target < count else OPEN] += valves * load
-    for target in range(count):
+    """Mix the models of a mixture before a step of `h` (s), by the rates at which valves and load change."""
+    first, switch = first_model(mixture), f.switch
+    opens, closes = 1.0 - math.exp(-OPENS * h), 1.0 - math.exp(-CLOSES * h)
+    comes, stays = 1.0 - math.exp(-COMES * h), 1.0 - math.exp(-STAYS * h)
+    switch[VALVES, VALVES], switch[VALVES, OPEN], switch[VALVES, BURST] = 1.0 - opens - comes, opens, comes
+    switch[OPEN, VALVES], switch[OPEN, OPEN], switch[OPEN, BURST] = closes, 1.0 - closes, 0.0
+    switch[BURST, VALVES], switch[BURST, OPEN], switch[BURST, BURST] = stays, opens, 1.0 - stays - opens
+    for target in range(MODELS):
         new = 0.0
-        for source in range(count):
+        for source in range(MODELS):
             new += f.chances[first + source] * switch[source, target]
         f.likely[target] = new
-        for source in range(count):
+        for source in range(MODELS):
             f.shares[source] = f.chances[first + source] * switch[source, target] / new
-        blend(f, first, count, f.mixed_x[target], f.mixed_p[target], size)
-    for target in range(count):
+        blend(f, first, f.mixed_x[target], f.mixed_p[target], size)
+    for target in range(MODELS):
         f.chances[first + target] = f.likely[target]
         for i in range(size):
             f.x[first + target, i] = f.mixed_x[target, i]
@@ -60,48 +53,40 @@ def interact(f, mixture, size, h):
 
 
 @inner
-def blend(f, first, count, mean, spread, size):
-    """Write mean and covariance of `count` models with the probabilities `f.shares`, two models at a time."""
-    clear(mean, size)
-    for k in range(count):
-        for i in range(size):
-            mean[i] += f.shares[k] * f.x[first + k, i]
+def blend(f, first, mean, spread, size):
+    """Write mean and covariance of a mixture from its models with the probabilities `f.shares`."""
+    one, two, three = f.shares[0], f.shares[1], f.shares[2]
+    x, y, z = f.x[first], f.x[first + 1], f.x[first + 2]
     for i in range(size):
-        line = spread[i]
-        for k in range(0, count, 2):
-            other = min(k + 1, count - 1)
-            one, two = f.shares[k], f.shares[other] if other > k else 0.0
-            if k > 0 and one + two < 1e-12:
-                continue
-            x, y, by_x, by_y = f.x[first + k], f.x[first + other], f.p[first + k, i], f.p[first + other, i]
-            to_x, to_y = one * (x[i] - mean[i]), two * (y[i] - mean[i])
-            if k == 0:
-                for j in range(size):
-                    line[j] = one * by_x[j] + two * by_y[j] + to_x * (x[j] - mean[j]) + to_y * (y[j] - mean[j])
-            else:
-                for j in range(size):
-                    line[j] += one * by_x[j] + two * by_y[j] + to_x * (x[j] - mean[j]) + to_y * (y[j] - mean[j])
+        mean[i] = one * x[i] + two * y[i] + three * z[i]
+    for i in range(size):
+        to_x, to_y, to_z = one * (x[i] - mean[i]), two * (y[i] - mean[i]), three * (z[i] - mean[i])
+        line, by_x, by_y, by_z = spread[i], f.p[first, i], f.p[first + 1, i], f.p[first + 2, i]
+        for k in range(size):
+            line[k] = one * by_x[k] + two * by_y[k] + to_x * (x[k] - mean[k]) + to_y * (y[k] - mean[k])
+        for k in range(size):
+            line[k] += three * by_z[k] + to_z * (z[k] - mean[k])
 
 
 @inner
 def mix(f, mixture, size):
     """Write mean and covariance of a mixture."""
-    first, count = models_of(mixture)
-    for k in range(count):
+    first = first_model(mixture)
+    for k in range(MODELS):
         f.shares[k] = f.chances[first + k]
-    blend(f, first, count, f.mean[mixture], f.spread[mixture], size)
+    blend(f, first, f.mean[mixture], f.spread[mixture], size)
 
 
 @inner
 def weigh_models(f, mixture):
     """Update the probabilities of a mixture's models by their likelihoods; return the log likelihood of the mixture."""
-    first, count = models_of(mixture)
+    first = first_model(mixture)
     most, total = f.likely[first], 0.0
-    for k in range(1, count):
+    for k in range(1, MODELS):
         most = max(most, f.likely[first + k])
-    for k in range(count):
+    for k in range(MODELS):
         f.chances[first + k] = max(f.chances[first + k] * math.exp(f.likely[first + k] - most), 1e-9)
         total += f.chances[first + k]
-    for k in range(count):
+    for k in range(MODELS):
         f.chances[first + k] /= total
     return most + math.log(total)

@@ -17,8 +17,7 @@ estimate adds zeros of IMU, angle sensors and force sensors, and errors of furth
 A closed valve locks the oil, so its drive stands still: that is a reading of rate zero. Three models interact (H. Blom and
 Y. Bar-Shalom, IEEE Trans. Automat. Control 33 (1988), 780-783): valves as they are believed to be; all valves open; valves as
 believed under a load that has just come. Where the second explains the lengths best, valves whose rates differ from zero are
-believed open, until they stand still. The estimate has the readings of all sensors, valves of its own, and a fourth model, of
-open valves under a load that has just come: lengths alone do not tell these two apart.
+believed open, until they stand still. The estimate has the same models with the readings of all sensors, and valves of its own.
 
 How far a drive's acceleration changes, and how large the fast load is, is learnt: the variance that a state is expected to have
 goes to the one that it shows (expectation maximisation, one step a sample).
@@ -32,10 +31,10 @@ from ..kernels.jit import inner, kernel
 from .channels import IMU_ZERO
 from .kalman import ANGLE_ZERO, FAST, correct, free_sensors, make_transition, transit
 from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
-from .mixture import copy_model, interact, mix, models_of, weigh_models
+from .mixture import MODELS, copy_model, first_model, interact, mix, weigh_models
 from .rows import SWAY_SHARE, clear, column_row, drive_row, read, variance_of
 from .states import (
-    ALL_OPEN_BURST,
+    ALL_BURST,
     ALL_VALVES,
     BURST,
     ESTIMATE,
@@ -118,19 +117,19 @@ def step_models(p, f, h, y):
         make_transition(p, f, h / steps)
         for _ in range(steps):
             for mixture in range(mixtures):
-                first, count = models_of(mixture)
-                for k in range(first, first + count):
-                    least2 = burst2 if k - first >= BURST else 0.0
+                first = first_model(mixture)
+                for k in range(first, first + MODELS):
+                    least2 = burst2 if k == first + BURST else 0.0
                     transit(p, f, k, states_of(p, mixture), h / steps, f.load2[mixture], least2)
         for mixture in range(mixtures):
-            first, count = models_of(mixture)
-            for k in range(first, first + count, 2):  # not those in which all are open
+            for model in (VALVES, BURST):
+                k = first_model(mixture) + model
                 hold_still(p, f, k, f.is_open[mixture], states_of(p, mixture))
     note_innovations(p, f, y)
     evidence = 0.0
     for mixture in range(mixtures):
-        first, count = models_of(mixture)
-        for k in range(first, first + count):
+        first = first_model(mixture)
+        for k in range(first, first + MODELS):
             f.likely[k] = take_lengths(p, f, k, states_of(p, mixture), y)
         evidence = weigh_models(f, mixture)
         mix(f, mixture, states_of(p, mixture))
@@ -223,9 +222,9 @@ def follow_prediction(p, f):
     size, every, n = zero_place(p), all_states(p), p.drives.shape[0]
     for i in range(n):
         f.is_open[ESTIMATE, i], f.still[ESTIMATE, i] = f.is_open[PREDICTION, i], f.still[PREDICTION, i]
-    for k in range(ALL_VALVES, ALL_OPEN_BURST + 1):
-        source = OPEN if k == ALL_OPEN_BURST else k - ALL_VALVES
-        f.chances[k] = 0.0 if k == ALL_OPEN_BURST else f.chances[source]
+    for k in range(ALL_VALVES, ALL_BURST + 1):
+        source = k - ALL_VALVES
+        f.chances[k] = f.chances[source]
         for i in range(every):
             f.x[k, i] = f.x[source, i] if i < size else 0.0
             for j in range(every):

@@ -11,7 +11,7 @@ from .kalman import ANGLE_ZERO, correct, take_innovation
 from .learning import SURPRISE
 from .mixture import mix, weigh_models
 from .rows import SWAY_SHARE, clear, read, variance_of
-from .states import ALL_OPEN_BURST, ALL_VALVES, ESTIMATE, FED, FED_STAMP, PREDICTION, all_states, zero_place
+from .states import ALL_BURST, ALL_VALVES, ESTIMATE, FED, FED_STAMP, PREDICTION, all_states, zero_place
 
 INEXACT = 0.03  # error of the model's accelerations and rates of turn: share of their root mean square at the site
 LEARN_NOISE = 0.02  # weight of one reading in the learnt noise of its channel
@@ -94,7 +94,7 @@ def admit_errors(p, f, count):
             f.mean[k, at] = 0.0
             for i in range(at + 1):
                 f.spread[k, i, at] = f.spread[k, at, i] = 0.0
-        for k in range(ALL_VALVES, ALL_OPEN_BURST + 1):
+        for k in range(ALL_VALVES, ALL_BURST + 1):
             f.x[k, at] = 0.0
             for i in range(at + 1):
                 f.p[k, i, at] = f.p[k, at, i] = 0.0
@@ -133,7 +133,7 @@ def correct_stamps(p, f, lag):
     """Add the estimated lag to the lags of its streams, and set its state to zero: rows are linear about the estimate."""
     at = zero_place(p) + lag
     change = f.mean[ESTIMATE, at]
-    for k in range(ALL_VALVES, ALL_OPEN_BURST + 1):
+    for k in range(ALL_VALVES, ALL_BURST + 1):
         f.x[k, at] -= change
     f.mean[ESTIMATE, at] = 0.0
     for c in range(p.channels.shape[0]):
@@ -166,7 +166,7 @@ def take_reading(p, f, channel, residual, variance):
     every = all_states(p)
     variance *= max(f.excess[channel], 1.0)
     shown, likelihood, ratio = 0.0, 0.0, f.ratio[channel]
-    for k in range(ALL_VALVES, ALL_OPEN_BURST + 1):
+    for k in range(ALL_VALVES, ALL_BURST + 1):
         innovation = residual
         for i in range(every):
             innovation -= f.row[i] * (f.x[k, i] - f.mean[PREDICTION, i])

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .channels import Measurement
 
 VALVES, OPEN, BURST = range(3)  # models of the prediction
-ALL_VALVES, ALL_OPEN, ALL_BURST, ALL_OPEN_BURST = range(3, 7)  # models of the estimate
+ALL_VALVES, ALL_OPEN, ALL_BURST = range(3, 6)  # models of the estimate
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
 LOADS = 6  # states of the load at the tip: along x and y its fast part (2), its slow part (2), rates of the fast part (2)
 FED, FED_STAMP = range(2)  # of `status`
@@ -38,7 +38,7 @@ class SensorNoise(NamedTuple):
 class Filters(NamedTuple):
     """Filters of one boom; n cylinders, m modes at most, s states, p of them of the prediction (zeros behind).
 
-    x, p : (7, s), (7, s, s) states and covariances of the models. chances : (7,) of them, in each mixture one in all.
+    x, p : (6, s), (6, s, s) states and covariances of the models. chances : (6,) of them, in each mixture one in all.
     mean, spread : (2, s), (2, s, s) of the mixtures. load2 : (2, 2) variances of the fast load, N^2, of prediction and
     estimate, along x and y.
     jerk : (n,) m^2/s^5. is_open, still : (2, n) 1 where a valve is believed open, s since its drive began to stand still.
@@ -119,7 +119,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
     own = 2 * modes + LOADS + 3 * joints
     states = own + behind + DELAYED
     return Filters(
-        x=np.zeros((7, states)), p=np.zeros((7, states, states)), chances=np.zeros(7), mean=np.zeros((2, states)),
+        x=np.zeros((6, states)), p=np.zeros((6, states, states)), chances=np.zeros(6), mean=np.zeros((2, states)),
         spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros((2, n), np.int64),
         still=np.zeros((2, n)), status=np.zeros(2, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
@@ -128,10 +128,10 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         late=np.zeros(len(Stream)), copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         places=np.zeros((own, 8 + n), np.int64), weights=np.zeros((own, 8 + n)), counts=np.zeros(own, np.int64),
         variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
-        half=np.zeros((own, states)), turned=np.zeros((own, own)), mixed_x=np.zeros((4, states)),
-        mixed_p=np.zeros((4, states, states)),
-        row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((9, states)), likely=np.zeros(7),
-        switch=np.zeros((4, 4)), shares=np.zeros(4), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),
+        half=np.zeros((own, states)), turned=np.zeros((own, own)), mixed_x=np.zeros((3, states)),
+        mixed_p=np.zeros((3, states, states)),
+        row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((9, states)), likely=np.zeros(6),
+        switch=np.zeros((3, 3)), shares=np.zeros(3), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),
         strokes=np.zeros((n, 3)), innovations=np.zeros((n, 2)),
     )  # fmt: skip
 

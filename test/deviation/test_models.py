@@ -9,11 +9,11 @@ from scipy.linalg import expm
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
 from boom_twin.deviation.kalman import DRIVE_TIME, FAST, SLOW, correct, make_transition, transit
-from boom_twin.deviation.mixture import CLOSES, COMES, OPENS, STAYS, interact, mix, models_of
+from boom_twin.deviation.mixture import CLOSES, COMES, OPENS, STAYS, first_model, interact, mix
 from boom_twin.deviation.posture import Posture
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.deviation.rows import length_row
-from boom_twin.deviation.states import ALL_VALVES, ESTIMATE, LOADS, OPEN, PREDICTION, Filters, all_states, zero_place
+from boom_twin.deviation.states import ALL_VALVES, ESTIMATE, LOADS, PREDICTION, Filters, all_states, zero_place
 from boom_twin.types import Array
 
 SCENE = load_scene()
@@ -113,27 +113,17 @@ def test_mixture_has_mean_and_covariance_of_its_models(boom: BoomPredictor) -> N
     boom.start(REST.lengths)
 
 
-@pytest.mark.parametrize(("mixture", "merged"), [(PREDICTION, True), (ESTIMATE, False)])
-def test_valves_and_load_change_independently_of_each_other(mixture: int, merged: bool, boom: BoomPredictor) -> None:
-    """Probabilities after a step are the product of two Markov chains of two states; open valves have one model or two."""
-    f, h, valves, load = boom.filters, 0.02, np.array([0.7, 0.3]), np.array([0.6, 0.4])
-    first, count = models_of.py_func(mixture)
-    before, after = (
-        np.outer(*chains).ravel()
-        for chains in (
-            (load, valves),
-            [
-                chances @ expm(h * np.array([[-up, up], [down, -down]]))
-                for chances, up, down in ((load, COMES, STAYS), (valves, OPENS, CLOSES))
-            ],
-        )
-    )
-    for each in (before, after) if merged else ():
-        each[OPEN] += each[3]
-    f.chances[first : first + count] = before[:count]
+@pytest.mark.parametrize("mixture", [PREDICTION, ESTIMATE])
+def test_probabilities_of_models_are_those_of_a_markov_chain(mixture: int, boom: BoomPredictor) -> None:
+    """Valves as believed open (OPENS) or a load comes (COMES), and ends (CLOSES, STAYS); valves open under a new load, too."""
+    f, h = boom.filters, 0.002
+    first = first_model.py_func(mixture)
+    rates = np.array([[-OPENS - COMES, OPENS, COMES], [CLOSES, -CLOSES, 0.0], [STAYS, OPENS, -STAYS - OPENS]])
+    before = np.array([0.5, 0.3, 0.2])
+    f.chances[first : first + 3] = before
     interact.py_func(f, mixture, 7, h)
-    assert f.chances[first : first + count] == pytest.approx(after[:count], abs=5e-3 if merged else 1e-4)
-    assert f.chances[first : first + count].sum() == pytest.approx(1.0)
+    assert f.chances[first : first + 3] == pytest.approx(before @ expm(h * rates), abs=2e-6)
+    assert f.chances[first : first + 3].sum() == pytest.approx(1.0)
     boom.start(REST.lengths)
 
 
