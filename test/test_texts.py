@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from html.parser import HTMLParser
+from math import nan
 from pathlib import Path
 
 import pytest
@@ -88,6 +89,7 @@ def test_evidence_is_figures_alone() -> None:
     """So it reads alike in all languages."""
     assert change_text(0.01, "rad", 1e-3) == "+0.573 deg (+- 0.057)" and change_text(-4642.0, "N") == "-4640 N"
     assert evidence_with_cause("+3 kg", [("tip.payload", 0.999), ("unknown", 0.001)]) == "+3 kg; tip.payload 99 %"
+    assert evidence_with_cause("+3 kg", [("not known", nan)]) == "+3 kg"
     assert translated("no such text", "de") == "no such text"
 
 

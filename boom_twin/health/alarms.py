@@ -106,7 +106,8 @@ def change_text(change: float, unit: str, sigma: float | None = None) -> str:
 
 def evidence_with_cause(evidence: str, causes: Iterable[tuple[str, float]]) -> str:
     """Return the evidence of an alarm with the probabilities of its two most probable causes."""
-    found = [f"{cause} {min(100.0 * chance, 99.0):.0f} %" for cause, chance in list(causes)[:2] if cause != UNKNOWN]
+    known = [(cause, chance) for cause, chance in list(causes)[:2] if cause != UNKNOWN and chance >= 0.005]
+    found = [f"{cause} {min(100.0 * chance, 99.0):.0f} %" for cause, chance in known]
     return "; ".join(part for part in (evidence, ", ".join(found)) if part)
 
 
