@@ -25,7 +25,7 @@ from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
 from ..scene.summary import explain
 from ..types import Alarm, Array, Stream, StrokeReading, channels_of
-from .alarms import UNKNOWN
+from .alarms import UNKNOWN, change_text
 
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
 LATE = 0.02  # s, delay of the stamps of a stream
@@ -197,18 +197,15 @@ class Evidence:
 
 
 def evidence_of(fault: Fault, spread: float) -> str:
-    """Return size and standard deviation of a fault as text."""
-    size = fault.size
+    """Return size and standard deviation of a fault as figures."""
+    size = -fault.size if fault.kind in ("softer", "less") else fault.size
     if fault.kind == "softer":
-        part, low, high = fault.cause.rpartition(".")[2], max(size - 2.0 * spread, 0.0), size + 2.0 * spread
-        return f"{part} {100.0 * size:.0f} % lower ({100.0 * low:.0f} to {100.0 * high:.0f})"
+        return f"{fault.cause.rpartition('.')[2]} {100.0 * size:.0f} % (+- {100.0 * spread:.0f})"
     if fault.is_load:
-        return f"by {size:.2g} {'kg' if fault.cause == 'tip.payload' else 'kg/m'} (+- {max(spread, 0.1):.1g})"
+        return change_text(size, "kg" if fault.cause == "tip.payload" else "kg/m", spread)
     if fault.kind == "late":
-        return f"by {1e3 * size:.0f} ms (+- {max(1e3 * spread, 1.0):.0f})"
-    if fault.channel.startswith("cylinder_force"):
-        return f"by {size:+.0f} N (+- {spread:.0f})"
-    return f"by {math.degrees(size):+.2f} deg (+- {math.degrees(spread):.2f})"
+        return change_text(1e3 * size, "ms", 1e3 * spread)
+    return change_text(size, "N" if fault.channel.startswith("cylinder_force") else "rad", spread)
 
 
 def explains(named: Alarm, stream: Stream, deviation: Alarm) -> bool:

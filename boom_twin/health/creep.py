@@ -14,6 +14,7 @@ import numpy as np
 from ..scene.kinematics import strokes_of_angles
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Stream
+from .alarms import change_text
 from .blocks import means_of
 
 SPAN, PARTS = 12, 4  # s of a window, several periods of a pump; equal parts of it whose means are compared
@@ -67,6 +68,6 @@ class CreepMonitor:
             onset = self.creeping[i] = before.get(i, self._seconds[0][0])
             change = float(rate[i]) * (now - onset) / SECOND
             if abs(change) >= CREPT and is_even[i] and i not in self._alarms:
-                name, told = f"cylinder_{i + 1}", f"by {1e3 * rate[i]:+.2g} mm/s, {1e3 * change:+.2g} mm up to now"
+                name, told = f"cylinder_{i + 1}", f"{change_text(1e3 * rate[i], 'mm/s')}, {change_text(1e3 * change, 'mm')}"
                 begun[i] = Alarm(name, "creeps", onset, None, f"{name}.drive", told)
         return begun
