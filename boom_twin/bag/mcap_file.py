@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from itertools import pairwise
 from operator import attrgetter
@@ -19,9 +19,10 @@ from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, Metadata, Schema, Statistics
 from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
+from numpy.typing import NDArray
 
 from ..errors import BagError
-from ..messages.cdr_decoder import MessageBlock, by_log_time, gather, joined
+from ..messages.cdr_decoder import Integers, MessageBlock, by_log_time, gather, joined
 from ..system.received_files import open_received
 from .mcap_records import (
     LARGEST_SUMMARY,
@@ -35,7 +36,7 @@ from .mcap_records import (
     record_of,
     unpack,
 )
-from .session_file import SessionFile, as_bag_error
+from .session_file import PIECE, LogClock, SessionFile, as_bag_error
 
 PROFILE = "ros2"
 NOTES = "boom_twin"  # name of the metadata record that holds the notes on a session
@@ -64,19 +65,28 @@ class McapFile(SessionFile):
                 for row, (channel, time) in enumerate(zip(block.sources.tolist(), block.log_times.tolist(), strict=True)):
                     yield channel, time, block.data(row)
 
-    def blocks(self, passed: Set[int]) -> Iterator[MessageBlock]:
+    def log_clock(self) -> LogClock:
+        """Return the clock as in `SessionFile`, from the index of the messages; without one, from the messages."""
+        with as_bag_error(self.path), open_received(self.path) as file:
+            return LogClock.of((_log_times(file, piece) for piece in self.pieces), self.counts)
+
+    def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
         """Yield blocks as in `SessionFile`, one piece after the other. Messages of equal time keep the order of the file.
 
-        Only pieces that overlap in time are held together.
+        Only pieces that overlap in time are held together. If the clock was set back, the order is that of the file.
         """
         held: dict[int, MessageBlock] = {}
-        pieces = sorted(enumerate(self.pieces), key=lambda each: each[1].message_start_time)
+        pieces = sorted(enumerate(self.pieces), key=lambda each: 0 if clock.places else each[1].message_start_time)
         chosen = (each for each in pieces if not each[1].message_index_offsets or each[1].message_index_offsets.keys() - passed)
         with open_received(self.path) as file:
             for (number, piece), (_, after) in pairwise([*chosen, (0, None)]):
                 assert piece is not None
                 block = _messages(_content(file, piece))
-                block = block.chosen(np.flatnonzero(~np.isin(block.sources, list(passed))))
+                block = block.chosen(rows := np.flatnonzero(~np.isin(block.sources, list(passed))))
+                if clock.places:
+                    shifts = np.array(clock.shifts, np.uint64)[np.searchsorted(clock.places, PIECE * number + rows, "right")]
+                    yield replace(block, log_times=np.maximum.accumulate(block.log_times + shifts))
+                    continue
                 held[number] = by_log_time(block)
                 if sum(len(each.content) for each in held.values()) > MOST_HELD or sum(map(len, held.values())) > MOST_TOGETHER:
                     what = f"more than {MOST_HELD} bytes or {MOST_TOGETHER} messages are out of order"
@@ -236,6 +246,19 @@ def _content(file: BinaryIO, piece: ChunkIndex) -> bytes:
             return raw
         raise McapError(f"no chunk of {piece.chunk_length} bytes at byte {piece.chunk_start_offset}")
     return unpack(Chunk.read(ReadDataStream(BytesIO(raw[PREFIX.size :]))))
+
+
+def _log_times(file: BinaryIO, piece: ChunkIndex) -> tuple[Integers, NDArray[np.uint64]]:
+    """Return channels and log times of the messages in a piece, in its order."""
+    if not piece.message_index_length:
+        block = _messages(_content(file, piece))
+        return block.sources, block.log_times
+    file.seek(piece.chunk_start_offset + piece.chunk_length)
+    index = [body for opcode, body in parts(file.read(piece.message_index_length)) if opcode == Opcode.MESSAGE_INDEX]
+    own = {int.from_bytes(body[:2], "little"): np.frombuffer(body[6:], "<u8").reshape(-1, 2) for body in index}
+    channels, (times, offsets) = np.repeat(list(own), [*map(len, own.values())]), np.concatenate([*own.values()]).T
+    order = np.argsort(offsets, kind="stable")
+    return channels[order], times[order]
 
 
 def _messages(content: bytes) -> MessageBlock:

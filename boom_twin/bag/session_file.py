@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import struct
 from abc import ABC, abstractmethod
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import islice
+from itertools import accumulate, islice
 from numbers import Real
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -17,11 +18,12 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from mcap.exceptions import McapError
 from mcap.records import Channel, Schema
+from numpy.typing import NDArray
 from rosbags.serde import SerdeError
 from zstandard import ZstdError
 
 from ..errors import BagError, UsageError
-from ..messages.cdr_decoder import MessageBlock, by_log_time, joined
+from ..messages.cdr_decoder import Integers, MessageBlock, by_log_time, joined
 from ..messages.type_store import decode, jazzy
 from ..types import NANO
 
@@ -84,6 +86,7 @@ WHOLE = TimeWindow()  # window of the whole session
 
 
 CDR = "cdr"
+PIECE = 2**32  # offset between the places of messages of two pieces of a file, more than the messages of a piece
 REMEDY = "The file is damaged or was cut off: `boom_twin recover BAG --out DIR` saves what is whole."
 
 _LZ4 = (RuntimeError,)
@@ -115,6 +118,38 @@ def by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> Coun
     for channel, count in counts.items():
         topics[channels[channel].topic] += count
     return topics
+
+
+class LogClock(NamedTuple):
+    """Shift of the recorder's clock within a file, which grows where the clock was set back."""
+
+    places: list[int]  # place of the first message of each shift but the first: its row in its piece, plus `PIECE` a piece
+    shifts: list[int]  # shifts by which the log times of every topic rise in the order of the file, ns
+
+    @classmethod
+    def of(cls, pieces: Iterable[tuple[Integers, NDArray[np.uint64]]], counts: Mapping[int, int]) -> LogClock:
+        """Return the clock from channels and log times of the messages, by pieces in the order of the file, and their counts.
+
+        A recorder writes the messages of a topic as they come. If of log times p, q, r of a topic q < p, the clock was set
+        back and went on if q < r < p. That holds for a third of the steps back in a random order, and for no late message:
+        it must hold for most, in topics of most messages, as all share the clock. Else the file is not in order.
+        """
+        votes, last, clock = Counter[int](), dict[int, tuple[NDArray[np.uint64], int]](), cls([], [0])
+        for number, (channels, times) in enumerate(pieces):
+            older, before = np.zeros(len(times), np.uint64), np.zeros(len(times), np.int64)
+            for channel in np.unique(channels).tolist():
+                rows, (held, place) = np.flatnonzero(channels == channel), last.get(channel, (np.zeros(2, np.uint64), 0))
+                own, at = np.concatenate([held, times[rows]]), np.concatenate([[place], PIECE * number + rows])
+                p, q, r = own[:-2], own[1:-1], own[2:]
+                votes[channel] += 2 * int(((q < r) & (r < p)).sum()) - int((q < p).sum())
+                older[rows], before[rows], last[channel] = q, at[:-1], (own[-2:], at[-1])
+            for row in np.flatnonzero(times < older).tolist():
+                shift = clock.shifts[bisect_right(clock.places, before[row])] + int(older[row] - times[row])
+                if shift > clock.shifts[-1]:
+                    clock.places.append(PIECE * number + row)
+                    clock.shifts.append(shift)
+        agreed = sum(counts.get(channel, 0) for channel, vote in votes.items() if vote > 0)
+        return clock if 2 * agreed > sum(counts.values()) else cls([], [0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,8 +190,12 @@ class SessionFile(ABC):
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield channel, log time (ns) and encoded data of all messages."""
 
-    def blocks(self, passed: Set[int]) -> Iterator[MessageBlock]:
-        """Yield blocks of all messages, except of the `passed` channels, in the order of log times.
+    def log_clock(self) -> LogClock:
+        """Return the clock of log times. The default is for a storage whose order is that of log times."""
+        return LogClock([], [0])
+
+    def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
+        """Yield blocks of all messages, except of the `passed` channels, in the order of log times by the `clock`.
 
         `sources` of a block holds channel numbers. This default requires that `heads` yields messages by log time.
         """
@@ -224,7 +263,9 @@ class SessionBlocks:
         return numbers
 
     def __iter__(self) -> Iterator[MessageBlock]:
-        blocks = _merged([_wanted(file, numbers) for file, numbers in self._files])
+        clocks = [file.log_clock() for file, _ in self._files]
+        ahead = accumulate((clock.shifts[-1] for clock in clocks), initial=0)  # a clock set back stays so in later files
+        blocks = _merged([_wanted(*file, clock, late) for file, clock, late in zip(self._files, clocks, ahead, strict=False)])
         return blocks if self._window == WHOLE else self._window.cut(blocks, self._files[0][0].path)
 
     def decoded(self, block: MessageBlock, row: int) -> Any:
@@ -237,19 +278,19 @@ class SessionBlocks:
             raise BagError(f"{place}: {error} {REMEDY}") from error
 
 
-def _wanted(file: SessionFile, numbers: Mapping[int, int]) -> Iterator[MessageBlock]:
-    """Yield blocks of the requested channels of one file (number 0 or more)."""
+def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahead: int) -> Iterator[MessageBlock]:
+    """Yield blocks of the requested channels of one file (number 0 or more), `ahead` ns later."""
     seen: Counter[int] = Counter()
     passed = {channel for channel, number in numbers.items() if number < 0}
     with as_bag_error(file.path):
-        for block in file.blocks(passed):
+        for block in file.blocks(passed, clock):
             seen.update(block.sources.tolist())
             unknown = ~np.isin(block.sources, list(numbers))
             end = int(unknown.argmax()) if unknown.any() else len(block)
             if end:
                 known = block.chosen(slice(0, end))
                 sources = np.array([numbers[channel] for channel in known.sources.tolist()])
-                yield replace(known, sources=sources)
+                yield replace(known, sources=sources, log_times=known.log_times + np.uint64(ahead))
             if end < len(block):
                 raise KeyError(int(block.sources[end]))
         told = {channel: count for channel, count in file.counts.items() if channel not in passed}

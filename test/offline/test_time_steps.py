@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from command import main
 from default_boom import joint_angles_of_strokes, strokes_of_posture
-from recordings import MessageWriter, sensor_message
-from ros_messages import load_topics
+from mcap.writer import IndexType, Writer
+from recordings import MessageWriter, read, scan, sensor_message
+from ros_messages import jazzy, load_topics, stamp_of
 
 from boom_twin import Sample, Stream, Twin, load_scene
 
@@ -64,6 +65,77 @@ def little_memory() -> Iterator[None]:
 def test_memory_of_a_replay_goes_by_its_samples(tmp_path: Path, days: int, little_memory: None) -> None:
     bag = write(tmp_path / "bag", samples(lambda row: days * DAY * (row >= ROWS // 2)))
     assert replayed(bag)["samples"] == ROWS
+
+
+def recorded(path: Path, found: list[Sample], logs: list[int], **options: Any) -> Path:
+    """Write one file of samples in their order by the mcap library."""
+    inputs, channels = load_topics().inputs, dict[Stream, int]()
+    with path.open("wb") as stream:
+        writer = Writer(stream, **options)
+        writer.start(profile="ros2", library="test")
+        for sample, log in zip(found, logs, strict=True):
+            topic = inputs[sample.stream]
+            if sample.stream not in channels:
+                schema = writer.register_schema(topic.type, "ros2msg", b"")
+                channels[sample.stream] = writer.register_channel(topic.absolute, "cdr", schema)
+            data = bytes(jazzy().serialize_cdr(sensor_message(sample), topic.type))
+            writer.add_message(channels[sample.stream], log, data, log)
+        writer.finish()
+    return path
+
+
+def order_of(path: Path) -> list[tuple[str, int]]:
+    """Return topic and stamp of all messages as they are read; their log times must rise."""
+    inputs = load_topics().inputs.values()
+    found = list(read(scan(path), {topic.absolute: topic.type for topic in inputs if scan(path).find(topic.name)}))
+    logs = [log for _, log, _ in found]
+    assert logs == sorted(logs) and logs[-1] - logs[0] == pytest.approx((ROWS // 2 - 1) * 5_000_000, abs=2e7)
+    return [(name, stamp_of(message)) for name, _, message in found]
+
+
+def named(found: list[Sample]) -> list[tuple[str, int]]:
+    return [(load_topics().inputs[sample.stream].absolute, sample.stamp) for sample in found]
+
+
+@pytest.mark.parametrize("step", [int(0.05 * SECOND), 3 * SECOND, 3600 * SECOND])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"chunk_size": 2**30},
+        {"chunk_size": 4000},
+        {"index_types": IndexType.NONE, "chunk_size": 4000},
+        {"use_chunking": False},
+    ],
+    ids=["one chunk", "chunks", "no index", "no chunks"],
+)
+def test_messages_are_in_file_order_where_the_clock_was_set_back(tmp_path: Path, options: dict[str, Any], step: int) -> None:
+    found = samples(rows=ROWS // 2)
+    logs = [sample.stamp + row % 3 * 1000 - step * (row >= 1201) for row, sample in enumerate(found)]
+    assert order_of(recorded(tmp_path / "bag.mcap", found, logs, **options)) == named(found)
+
+
+def test_files_follow_one_in_which_the_clock_was_set_back(tmp_path: Path) -> None:
+    found = samples(rows=ROWS // 2)
+    logs = [sample.stamp - SECOND * (row >= 600) for row, sample in enumerate(found)]
+    for number, part in enumerate((slice(0, 1200), slice(1200, None))):
+        recorded(tmp_path / f"bag_{number}.mcap", found[part], logs[part], chunk_size=4000)
+    assert order_of(tmp_path) == named(found)
+
+
+@pytest.mark.parametrize("kind", ["topic after topic", "random", "late messages", "one topic"])
+def test_messages_that_are_not_in_file_order_are_sorted(tmp_path: Path, kind: str) -> None:
+    by_time = sorted(samples(rows=ROWS // 2), key=lambda sample: sample.stamp)
+    logs = [sample.stamp + row % 3 * 1000 for row, sample in enumerate(by_time)]
+    rows = np.arange(len(by_time))
+    keys = {
+        "topic after topic": rows % 3,
+        "random": np.random.default_rng(1).random(len(rows)),
+        "late messages": rows + np.where(rows % 100 < 3, 30.5, 0.0),
+        "one topic": np.where(rows % 3 == 0, (rows + 1200) % 2400, rows),
+    }
+    order = np.argsort(keys[kind], kind="stable").tolist()
+    path = recorded(tmp_path / "bag.mcap", [by_time[row] for row in order], [logs[row] for row in order], chunk_size=4000)
+    assert order_of(path) == named(by_time)
 
 
 def test_samples_that_wait_for_the_first_strokes_are_dropped_when_their_stamps_come_again() -> None:
