@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import re
 from contextlib import redirect_stderr
 from pathlib import Path
 
@@ -20,8 +19,7 @@ def report(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("report")
     with redirect_stderr(io.StringIO()) as told:
         assert main(["study", "error", "--quick", "--out", str(out)]) == 0
-    shares = re.findall(r"^study error: (\d+) %, ", told.getvalue(), re.MULTILINE)  # and no bar, for this is no terminal
-    assert shares == [str(share) for share in range(10, 101, 10)] and "\r" not in told.getvalue()
+    assert "\r" not in told.getvalue()  # no bar, for this is no terminal
     return out
 
 
