@@ -128,7 +128,7 @@ class Player:
             The session cannot be read.
         """
         first = self._session.start + round(start / NANO)
-        end = self._session.end + 1 if duration is None else first + round(duration / NANO)
+        end = 2**64 if duration is None else first + round(duration / NANO)
         entered = began = time.monotonic()
         sent, previous = began, 0.0
         try:
