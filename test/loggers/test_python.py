@@ -148,7 +148,7 @@ def test_readings_that_no_rig_can_give_are_refused(fault: str) -> None:
 
 
 MISUSES: dict[str, tuple[Callable[[], Any], str]] = {
-    "no sample": (lambda: Twin().update(3), "sample is 3. Give Sample(Stream.STROKES, stamp_ns, values)"),  # type: ignore[arg-type]
+    "no sample": (lambda: Twin().update(3), "sample is 3. Give Sample(Stream.STROKES, stamp_ns"),  # type: ignore[arg-type]
     "settings": (lambda: Twin(None, {"health": False}), "give Settings(name=value, ..)"),  # type: ignore[arg-type]
     "sensor": (lambda: Twin().rezero("joint_9"), "'joint_9': no sensor of this boom. Give tip_imu, or one of cylinder_1,"),
     "start": (lambda: TimeWindow(float("nan"), 2.0), "start = nan: must be a number of seconds, at least 0."),
