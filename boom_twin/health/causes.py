@@ -24,7 +24,7 @@ from ..deviation.predictor import LAG_FLOOR
 from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
 from ..scene.summary import explain
-from ..types import Alarm, Array, Stream, StrokeReading, channels_of
+from ..types import Alarm, Array, Stream, StrokeReading, channels_of, sensor_kind
 from .alarms import UNKNOWN, change_text
 
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
@@ -205,7 +205,7 @@ def evidence_of(fault: Fault, spread: float) -> str:
         return change_text(size, "kg" if fault.cause == "tip.payload" else "kg/m", spread)
     if fault.kind == "late":
         return change_text(1e3 * size, "ms", 1e3 * spread)
-    return change_text(size, "N" if fault.channel.startswith("cylinder_force") else "rad", spread)
+    return change_text(size, sensor_kind(fault.channel).unit, spread)
 
 
 def explains(named: Alarm, stream: Stream, deviation: Alarm) -> bool:

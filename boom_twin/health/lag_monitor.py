@@ -74,7 +74,8 @@ class LagMonitor:
             if not any(_exceeds(lag._replace(lag=lag.lag - surest.lag)) for lag in lags.values()):
                 late = {self._drive: surest._replace(lag=-surest.lag)}
         near = {stream for stream, lag in lags.items() if abs(lag.lag) + SIGMAS * lag.sigma < LEAST}
-        near |= {self._drive} if near == lags.keys() else set()
+        if near == lags.keys():
+            near.add(self._drive)
         news = [replace(self._alarms.pop(stream), until=end) for stream in list(self._alarms) if stream in near]
         for stream, lag in late.items():
             if stream not in self._alarms:
