@@ -251,9 +251,11 @@ def _accuracy(
     scene: Scene, sensors: Sequence[tuple[str, Stream, Mapping[str, Place]]], drive: str
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the accuracy at every posture with every selection of `sensors`, as values for ``--json`` and as lines."""
+    from ..config.settings import Settings
     from ..deviation.accuracy import accuracy_at
 
     reads = StrokeReading.ANGLE if drive == "angles" else StrokeReading.LENGTH
+    exact = Settings(scene_error=0.0)  # its part is the same with all sensors
     values: dict[str, Any] = {}
     sets = {
         ",".join(name for name, *_ in chosen) or f"{drive} only": chosen
@@ -261,14 +263,14 @@ def _accuracy(
         for chosen in combinations(sensors, count)
     }
     acting = "an unknown load of 0.25 % of the boom's weight comes and goes at the tip"
-    lines = ["", f"Accuracy of the estimate at rest, while {acting} (standard deviations)"]
+    lines = ["", f"Accuracy of the estimate at rest, while {acting} (standard deviations, scene exact)"]
     titles = f"{'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
     lines.append(f"  {'posture':12} {f'sensors beside {drive}':24} {titles}")
     for posture in scene.postures:
         for name, chosen in sets.items():
             try:
                 streams, places = [stream for _, stream, _ in chosen], {k: v for *_, own in chosen for k, v in own.items()}
-                result = accuracy_at(scene, strokes_of_posture(scene, posture), streams, reads=reads, places=places)
+                result = accuracy_at(scene, strokes_of_posture(scene, posture), streams, exact, reads=reads, places=places)
             except BoomTwinError as error:
                 lines.append(f"  {posture:12} {name:24} {error}")
                 continue

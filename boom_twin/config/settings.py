@@ -177,6 +177,9 @@ class Settings(BaseModel):
     pressure_sigma: float = setting(1e4, "Pa", POSITIVE, "standard deviation of the noise of a cylinder's pressure")
     moment_sigma: float = setting(50.0, "N m", POSITIVE, "standard deviation of the noise of a bending moment")
     point_sigma: float = setting(2e-3, "m", POSITIVE, "standard deviation of the noise of the position of a point")
+    scene_error: float = setting(
+        0.02, "1", {"ge": 0.0, "le": 0.3}, "relative standard deviation of the scene's stiffnesses and masses"
+    )
     payload: float = setting(-1.0, "kg", LOAD, "mass at the tip; below 0: that of the scene", True)
     line_fill: float = setting(-1.0, "kg/m", LOAD, "concrete in the pipe line; below 0: that of the scene", True)
     stroke_rate: float = setting(STROKE_RATE, "m/s", LIMIT, "maximum speed of a cylinder; faster strokes are left out", True)

@@ -99,5 +99,5 @@ def settle_covariance(t, boom, live, work, p, f, row, lengths, gravity, counts, 
         for stream in range(1, counts.shape[0]):
             for _ in range(counts[stream] if k % every[stream] == 0 else 0):
                 take_sensor(p, f, stream, first[stream], zeros, stamp, stamp)
-        write_tip_estimate(p, f, results, out)
+        write_tip_estimate(p, f, live, results, out)
         f.load2[:] = usual2  # readings without noise would let it fall

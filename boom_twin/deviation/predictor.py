@@ -129,8 +129,8 @@ class BoomPredictor:
         mounting = mounting_of(self.plan, mounts)
         measured = measurement_of(self.plan, settings, mounting, places, lagging)
         self.posture = new_posture(self.plan, MODES, lengths, mounting, measured, reads, scene.base.inclination)
-        sizes = (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)
-        noise = SensorNoise(settings.variance(SENSORS[reads.stream]), *(size * weight for size in sizes))
+        loads = [size * weight for size in (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)]
+        noise = SensorNoise(settings.variance(SENSORS[reads.stream]), settings.scene_error, *loads)
         self.filters = new_filters(n, MODES, measured, noise)
         self.finder = RestFinder(scene, self.plan, self.posture, reads)
         tables, boom = self.plan.tables, (self._anchor, self.live, self._work)

@@ -22,12 +22,14 @@ DELAYED = 128  # states at most that hold readings of late streams, see `delayed
 
 
 class SensorNoise(NamedTuple):
-    """Variances of what drives the model, and sizes of loads (N): usual, least, at the start of a session, just come.
+    """Variance of what drives the model, error of the scene, sizes of loads: usual, least, first in a session, just come.
 
-    length2 : of lengths (m^2) or angles (rad^2).
+    length2 : of lengths (m^2) or angles (rad^2). scene_error : relative standard deviation of stiffnesses and masses. The
+    loads are in N.
     """
 
     length2: float
+    scene_error: float
     usual_load: float
     least_load: float
     first_load: float

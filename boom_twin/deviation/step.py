@@ -12,7 +12,7 @@ from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, NOT_FINITE, OK
 from ..kernels.transfer.forward_kinematics import place
-from .channels import READS_ACCELERATION
+from .channels import READS_ACCELERATION, READS_COORDINATE
 from .estimate_row import (
     ACCELERATION,
     ACCELERATION_COVARIANCE,
@@ -48,6 +48,7 @@ from .rows import (
 from .sensor_model import specific_force
 from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, drive_place, force_place, zero_place
 
+MASS_PART = 0.77  # variance of the tip by errors of the masses over that of EI: a cantilever of four equal sections
 FAULT_CHANCE, FAULT = 0.01, 0.03  # that a sensor is off, and by how much as an angle of its joint, rad
 PATIENCE = 1_000_000_000  # ns without readings after which the estimate is the prediction again
 FOLLOW = np.bool_(True)  # of `linearise`, see `boom_twin.kernels.transfer.time_step.ANEW`
@@ -254,7 +255,7 @@ def rigid_tip(t, p, lengths):
 
 
 @inner
-def write_tip_estimate(p, f, results, out):
+def write_tip_estimate(p, f, live, results, out):
     """Write the estimate beside the newest prediction; see `boom_twin.deviation.estimate_row.WIDTH`."""
     n, m, size, load = p.drives.shape[0], p.modes[0], zero_place(p), force_place(p)
     mean, expected = f.mean[ESTIMATE], f.mean[PREDICTION]
@@ -267,6 +268,8 @@ def write_tip_estimate(p, f, results, out):
         out[ACCELERATION + a] = results.tip[2, a] + difference(f.rows[6 + a], mean, expected, size)
     write_covariance(f, 0, size, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     add_doubt(p, f, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
+    if not reads_points(p, f):
+        add_scene_error(p, f, live, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     write_covariance(f, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
     write_covariance(f, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
     for j in range(MODES):
@@ -296,6 +299,38 @@ def add_doubt(p, f, out):
         for a in range(3):
             for b in range(a, 3):
                 out[at] += share * p.readings[2 + i, n + a] * p.readings[2 + i, n + b]
+                at += 1
+
+
+@inner
+def reads_points(p, f):
+    """Return True if the estimate has read the position of a point, which also shows what the scene has wrong."""
+    for c in range(p.channels.shape[0]):
+        if p.channels[c].kind == READS_COORDINATE and p.behind[0] > p.channels[c].zero and not f.masked[c]:
+            return True
+    return False
+
+
+@inner
+def add_scene_error(p, f, live, out):
+    """Add the variance by wrong stiffnesses and masses of sections to the upper triangle of the tip's covariance.
+
+    The bending of section i moves the tip by c_i = (d_i + a_i e_z x r_i, a_i), with the deflection d_i and the turn a_i of its
+    end against its root, and r_i from its end to the tip. Independent relative errors of the EI add the sum of c_i c_i^T times
+    their variance. Those of the masses add `MASS_PART` times as much.
+    """
+    n, share2 = p.drives.shape[0], (1.0 + MASS_PART) * f.noise.scene_error * f.noise.scene_error
+    tip, moved = live.frames[p.roots[n]], f.row
+    for i in range(n):
+        root, end = live.frames[p.roots[i]], live.frames[p.roots[i + 1] - (1 if i < n - 1 else 0)]
+        heading, turn = root[FRAME_ANGLE], end[FRAME_ANGLE] - root[FRAME_ANGLE]
+        moved[0] = end[FRAME_X] - root[FRAME_X] - p.lengths[i] * math.cos(heading) - turn * (tip[FRAME_Y] - end[FRAME_Y])
+        moved[1] = end[FRAME_Y] - root[FRAME_Y] - p.lengths[i] * math.sin(heading) + turn * (tip[FRAME_X] - end[FRAME_X])
+        moved[2] = turn
+        at = 0
+        for a in range(3):
+            for b in range(a, 3):
+                out[at] += share2 * moved[a] * moved[b]
                 at += 1
 
 

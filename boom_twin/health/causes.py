@@ -7,8 +7,9 @@ A cause is named if its posterior probability is high. Three facts limit that.
 - Successive innovations are not independent. So likelihoods are raised to the power `TEMPER`.
 - An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. In each
   second no log likelihood counts as more than `MOST_GAIN` below the best.
-- Parameters of a healthy boom are wrong by `WRONG`. So its likelihood is that of the boom as believed, and what these errors
-  are expected to cost that. A fault is named only if its size is likelier than one that these errors make appear.
+- Parameters of a healthy boom are wrong by `Settings.scene_error`. So its likelihood is that of the boom as believed, and
+  what these errors are expected to cost that. A fault is named only if its size is likelier than one that these errors make
+  appear.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..config.settings import Settings
 from ..deviation.predictor import LAG_FLOOR
 from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
@@ -29,7 +31,6 @@ from .alarms import UNKNOWN, change_text
 
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
 LATE = 0.02  # s, delay of the stamps of a stream
-WRONG = 0.02  # relative standard deviation of each parameter of a healthy boom
 TEMPER = math.log(20.0) / 25.0  # power of likelihoods: 25 nats more make a cause 20 times as probable
 MOST_GAIN = 12.0  # nats by which the likelihood of a second is below the best, at most
 MEMORY = 60  # s of gains that are kept
@@ -124,16 +125,16 @@ def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -
     return [*found, *(Fault(f"{stream.value}.delay", "late", LATE) for stream in streams)]
 
 
-def usual_size(scene: Scene, fault: Fault) -> float:
-    """Return the standard deviation of what looks like a fault in a healthy boom, whose parameters are wrong by `WRONG`.
+def usual_size(scene: Scene, fault: Fault, error: float) -> float:
+    """Return the standard deviation of what looks like a fault in a healthy boom whose parameters are wrong by `error`.
 
-    Independent mass errors of n equal sections turn a straight boom of mass M like a payload of `WRONG` M / sqrt(3 n).
+    Independent mass errors of n equal sections turn a straight boom of mass M like a payload of `error` M / sqrt(3 n).
     """
     if fault.kind == "softer":
-        return WRONG
+        return error
     if not fault.is_load:
         return LAG_FLOOR if fault.kind == "late" else 0.0
-    payload = WRONG * explain(scene).mass / math.sqrt(3.0 * len(scene.sections))
+    payload = error * explain(scene).mass / math.sqrt(3.0 * len(scene.sections))
     return payload if fault.cause == "tip.payload" else 2.0 * payload / scene.reach
 
 
@@ -156,16 +157,17 @@ class Evidence:
     ----------
     scene : Scene
     faults : sequence of Fault
-    odds : float
-        Posterior probability required to name a cause.
+    settings : Settings
+        With the posterior probability required to name a cause, and the errors of the scene.
     """
 
-    def __init__(self, scene: Scene, faults: Sequence[Fault], odds: float) -> None:
-        self._odds, self._faults, none = odds, tuple(faults), np.zeros(len(faults))
+    def __init__(self, scene: Scene, faults: Sequence[Fault], settings: Settings) -> None:
+        self._odds, self._faults, none = settings.name_odds, tuple(faults), np.zeros(len(faults))
         self._wrong = none.copy()  # share of a fault's cost that its usual size has: costs are as squares of sizes
         for i, fault in enumerate(faults):
             if (fault.kind == "softer" and fault.is_told) or fault.cause == "tip.payload":  # the others repeat these
-                self._wrong[i] = (usual_size(scene, fault) / fault.size) ** 2 / [x.cause for x in faults].count(fault.cause)
+                self._wrong[i] = (usual_size(scene, fault, settings.scene_error) / fault.size) ** 2
+                self._wrong[i] /= [x.cause for x in faults].count(fault.cause)
         self._gains, self._stamps = deque([none], maxlen=MEMORY), deque([0], maxlen=MEMORY)
 
     def take(self, stamp: int, likelihoods: Array) -> Verdict | None:

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
@@ -86,8 +87,8 @@ class FaultTwins:
         Boom with its load.
     make : callable
         Hypothesis -> its twin.
-    odds : float
-        Posterior probability required to name a cause.
+    settings : Settings
+        With the posterior probability required to name a cause, and the errors of the scene.
     is_live : bool
         True if the caller must not wait. On a busy processor verdicts then come later than `DELAY`.
     reads : StrokeReading
@@ -98,12 +99,12 @@ class FaultTwins:
         self,
         scene: Scene,
         make: Callable[[Hypothesis], Follower],
-        odds: float,
+        settings: Settings,
         is_live: bool = False,
         reads: StrokeReading = StrokeReading.LENGTH,
     ) -> None:
         self._reads = reads
-        self._scene, self._make, self._odds, self._is_live = scene, make, odds, is_live
+        self._scene, self._make, self._settings, self._is_live = scene, make, settings, is_live
         self._lasting: dict[str, Alarm] = {}
         self._pending: list[Any] = []
         self._second = 0  # whole seconds of the pending samples' stamps
@@ -204,7 +205,7 @@ class FaultTwins:
 
     def _decide_anew(self) -> None:
         """Discard all evidence of faults."""
-        self._decision, self._age = Evidence(self._scene, self._faults, self._odds), 0
+        self._decision, self._age = Evidence(self._scene, self._faults, self._settings), 0
         self._evidence = np.array([twin.evidence for twin in self._twins])
 
     def _made(self, each: Hypothesis) -> Follower:
@@ -287,12 +288,13 @@ class FaultTwins:
         Twins of larger and smaller sizes follow the recent seconds until the likelihood falls on both sides. None if the
         size is not surely larger than the largest that a healthy boom seems to have.
         """
-        sure = math.log(self._odds / (1.0 - self._odds))
+        odds = self._settings.name_odds
+        sure = math.log(odds / (1.0 - odds))
         if fault.kind == "off":
             changed, spread = self._change_of_zero(fault, onset)
             return (changed, spread, onset) if 0.5 * (changed.size / spread) ** 2 > sure else None
-        usual = usual_size(self._scene, fault)
-        least = NormalDist().inv_cdf(0.5 + 0.5 * self._odds) * usual
+        usual = usual_size(self._scene, fault, self._settings.scene_error)
+        least = NormalDist().inv_cdf(0.5 + 0.5 * odds) * usual
         healthy = self._course(fault._replace(size=least), onset)
 
         def gained(size: float) -> Array:

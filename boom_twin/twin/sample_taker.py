@@ -81,7 +81,7 @@ class SampleTaker:
         self._judged = True  # health, with the present sample
         self._fault_twins: FaultTwins | None = None
         if causes and health:
-            self._fault_twins = FaultTwins(self.scene, self._maker(), self.settings.name_odds, is_live, reads)
+            self._fault_twins = FaultTwins(self.scene, self._maker(), self.settings, is_live, reads)
         self._begin()
 
     def _begin(self) -> None:

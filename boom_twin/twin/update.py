@@ -82,7 +82,7 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
         write_expected_readings(p, f, live, results, stamp, span, past.values[at], past.sigmas[at])
         flush_waiting(limits, state, row, found)
         take_residuals(limits, state, p, f, before, found)
-        write_tip_estimate(p, f, results, found.estimates[found.counts[0] - 1])
+        write_tip_estimate(p, f, live, results, found.estimates[found.counts[0] - 1])
         row += 1
         if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED]:
             return LOOK, row - 1

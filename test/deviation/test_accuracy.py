@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,17 +13,22 @@ import pytest
 from command import main
 from default_boom import default_text, strokes_of_posture
 
-from boom_twin import Sample, Stream, Twin, load_scene, statics
+from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
 from boom_twin.deviation.accuracy import TipAccuracy, accuracy_at
+from boom_twin.scene.schema import Scene
+from boom_twin.types import Place
+from boom_twin.validation.rig.faults import wrong_by
 
 SCENE = load_scene()
 ARCH = strokes_of_posture(SCENE, "arch")
+Z_FOLD = load_scene(str(files("boom_twin") / "examples" / "five_section_z_fold.yaml"))
+EXACT = Settings(scene_error=0.0)
 SETS = ([], [Stream.ANGLES], [Stream.ANGLES, Stream.IMU], [Stream.ANGLES, Stream.IMU, Stream.IMU])
 
 
 @pytest.fixture(scope="module")
 def found() -> list[TipAccuracy]:
-    return [accuracy_at(SCENE, ARCH, chosen) for chosen in SETS]
+    return [accuracy_at(SCENE, ARCH, chosen, EXACT) for chosen in SETS]
 
 
 def test_more_sensors_are_never_worse(found: list[TipAccuracy]) -> None:
@@ -45,10 +51,41 @@ def test_it_is_what_a_twin_comes_to() -> None:
     assert np.sqrt(np.mean(estimates[2000:], axis=0)) == pytest.approx(stated.tip, rel=0.15)  # learnt noise adds to it
 
 
+def covariance_at_rest(scene: Scene, settings: Settings, lengths: np.ndarray, point: np.ndarray | None = None) -> np.ndarray:
+    """Return variances (x, y, angle) of the tip after a second of these lengths, and of positions of the tip."""
+    twin = Twin(scene, settings, places={"points": Place()})
+    for k in range(200):
+        report = twin.update(Sample(Stream.STROKES, 5_000_000 * k, lengths))
+        if point is not None:
+            twin.update(Sample(Stream.POINT, 5_000_000 * k, point))
+    assert report.estimate is not None
+    return np.array(report.estimate.tip_covariance[[0, 3, 5]])
+
+
+@pytest.mark.parametrize(("scene", "posture"), [(SCENE, "arch"), (SCENE, "high"), (Z_FOLD, "arch"), (Z_FOLD, "folded")])
+def test_stated_deviation_contains_errors_of_the_scene(scene: Scene, posture: str) -> None:
+    """Sixty rigs 2 % wrong, at rest. Errors beyond twice that are not drawn: the others have 0.88 of the deviation."""
+    strokes, off = strokes_of_posture(scene, posture), []
+    for seed in range(60):
+        wrong = statics(wrong_by(scene, 0.02, seed), strokes)
+        off.append(wrong.tip - statics(scene, lengths=wrong.lengths).tip)
+    lengths = statics(scene, strokes).lengths
+    added = covariance_at_rest(scene, Settings(), lengths) - covariance_at_rest(scene, EXACT, lengths)
+    assert (added > 0.0).all()
+    found = np.sqrt(np.mean(np.square(off), axis=0))
+    assert found == pytest.approx(0.88 * np.sqrt(added[:2]), rel=0.3, abs=1e-4)
+
+
+def test_a_measured_position_shows_what_the_scene_has_wrong() -> None:
+    rest = statics(SCENE, ARCH)
+    with_errors, exact = (covariance_at_rest(SCENE, each, rest.lengths, rest.tip) for each in (Settings(), EXACT))
+    assert (with_errors == exact).all()
+
+
 @pytest.mark.parametrize(("off", "low", "high"), [(0.0, 0.0, 1e-3), (4e-3, 0.08, 0.2)])
 def test_a_transducer_that_an_angle_sensor_contradicts_is_stated(off: float, low: float, high: float) -> None:
     """Cylinder 2 reads too much. The error is within what is stated, which is small without a contradiction."""
-    twin, rng, rest = Twin(SCENE), np.random.default_rng(2), statics(SCENE, strokes=ARCH)
+    twin, rng, rest = Twin(SCENE, EXACT), np.random.default_rng(2), statics(SCENE, strokes=ARCH)
     strokes = rest.lengths + off * np.eye(4)[1]
     for k in range(1000):
         report = twin.update(Sample(Stream.STROKES, 5_000_000 * k, strokes + 2e-5 * rng.normal(size=4)))

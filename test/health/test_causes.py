@@ -9,6 +9,7 @@ from default_boom import joint_angles_of_strokes, strokes_of_angles
 from oracle import booms
 
 from boom_twin import load_scene
+from boom_twin.config.settings import Settings
 from boom_twin.health.causes import MOST_GAIN, TEMPER, Evidence, Fault, hypothesis, possible_faults
 from boom_twin.health.fault_twins import FaultTwins
 from boom_twin.texts import alarm_text
@@ -20,13 +21,13 @@ SPRING, SECTION, LOAD = (
     Fault("section_2.EI", "softer", 0.25),
     Fault("tip.payload", "more", 20.0),
 )
-ODDS = 0.95
+SETTINGS = Settings()
 ENOUGH = math.log(2 * 19.0) / TEMPER  # nats for odds of 0.95 to 0.05 against the healthy boom and one other cause
 
 
 def verdict(faults, gains):
     """Return the first verdict on gains (seconds, faults), and the second in which it comes."""
-    evidence = Evidence(load_scene(), faults, ODDS)
+    evidence = Evidence(load_scene(), faults, SETTINGS)
     for second, row in enumerate(gains):
         if (found := evidence.take(second * SECOND, np.array([0.0, *row]))) is not None:
             return found, second
@@ -154,14 +155,14 @@ def test_a_load_that_wrong_masses_look_like_is_not_named(more, named):
     def made(each):
         return Follower(lambda _: -0.4 * (each.payload - more) ** 2)
 
-    found = taken(FaultTwins(load_scene(), made, ODDS), 60)
+    found = taken(FaultTwins(load_scene(), made, SETTINGS), 60)
     assert [alarm.cause for alarm in found] == named
     assert all("+20 kg (+- " in alarm.evidence for alarm in found)
 
 
 def test_a_cause_that_helps_at_any_size_is_not_named():
     """A boom as believed that has lost the motion is no evidence for a fault that helps with 2 % as much as with 25 %."""
-    twins = FaultTwins(load_scene(), lambda each: Follower(lambda _: 50.0 * (spring_of(each) > 0.01)), ODDS)
+    twins = FaultTwins(load_scene(), lambda each: Follower(lambda _: 50.0 * (spring_of(each) > 0.01)), SETTINGS)
     assert taken(twins, 40) == []
 
 
@@ -172,7 +173,7 @@ def test_a_fault_comes_and_goes():
         lost = spring_of(each)
         return Follower(lambda second: -100.0 * (lost - (0.3 if 20 <= second < 60 else 0.0)) ** 2)
 
-    twins = FaultTwins(load_scene(), made, ODDS)
+    twins = FaultTwins(load_scene(), made, SETTINGS)
     begun, ended = taken(twins, 120)
     assert (begun.channel, begun.cause, begun.kind, begun.since) == ("cylinder_2", "cylinder_2.k", "softer", 20 * SECOND)
     assert "k -30 % (+- " in begun.evidence
@@ -188,7 +189,7 @@ def test_a_recorded_load_is_the_load_of_all_twins():
         made.append((each, Follower(lambda _: 0.0)))
         return made[-1][1]
 
-    twins = FaultTwins(load_scene(), make, ODDS)
+    twins = FaultTwins(load_scene(), make, SETTINGS)
     twins.change(Change(0, False, {"payload": 30.0, "line_fill": -1.0, "tip_load_limit": 500.0}, {}))
     twins.news(10 * SECOND)  # waits for the thread
     for each, twin in made:
@@ -217,7 +218,7 @@ def test_a_leak_is_no_softer_spring(turns):
     """
     crept = 1e-3 * np.clip(np.arange(60.0) - 20.0, 0.0, 20.0)[:, None] * np.array([0.0, 1.0, 0.0, 0.0])
     start = strokes_of_angles(load_scene(), np.radians([60.0, -40.0, -30.0, -20.0]))
-    twins, found = FaultTwins(load_scene(), lambda each: Follower(lambda second: rate_of(each, second)), ODDS), []
+    twins, found = FaultTwins(load_scene(), lambda each: Follower(lambda second: rate_of(each, second)), SETTINGS), []
 
     def rate_of(each, second):
         return 10.0 * (spring_of(each) > 0.0) * (20 <= second < 40) * turns
@@ -239,7 +240,7 @@ def test_a_leak_is_no_softer_spring(turns):
 
 def test_evidence_before_a_change_counts_no_more():
     """What a fault hypothesis gained under another load names nothing after the load is set anew."""
-    twins, found = FaultTwins(load_scene(), lambda each: Follower(lambda second: 3.0 * (spring_of(each) > 0.2)), ODDS), []
+    twins, found = FaultTwins(load_scene(), lambda each: Follower(lambda second: 3.0 * (spring_of(each) > 0.2)), SETTINGS), []
     for second in range(45):
         if second % 15 == 14:
             twins.change(Change(second * SECOND, False, {"payload": 0.0, "line_fill": 0.0, "tip_load_limit": 500.0}, {}))
