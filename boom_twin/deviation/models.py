@@ -55,7 +55,7 @@ CONTRADICTION = 8.0  # standard deviations of the predicted tip, by which the es
 MOST_EXCESS = 1e6  # times the variance that a channel is stated to have
 
 
-@inner
+@kernel
 def start_models(p, f, speed, swing):
     """Start at rest at the drives of the posture. Drives may move at `speed` (m/s), the tip may vibrate by `swing` (m)."""
     n, m, size = p.drives.shape[0], p.modes[0], all_states(p)

@@ -18,6 +18,7 @@ from ..predictions import Outline
 from ..types import Health, Report, Residuals, Stream
 from .blocks import (
     CODES,
+    REGULAR,
     STREAMS,
     EstimateBlock,
     Integers,
@@ -40,7 +41,7 @@ class BlockUpdate:
     """Driver of the compiled update, for regular samples.
 
     `channels`: see `boom_twin.types.channels_of`. ``deflected`` and ``unmatched`` are added to `counts`. One call
-    takes at most `capacity` samples.
+    takes at most `capacity` samples. Unless `is_reporting`, reports are empty.
     """
 
     def __init__(
@@ -52,6 +53,7 @@ class BlockUpdate:
         judge: HealthMonitor | None,
         counts: Counter[str],
         capacity: int = ROOM.samples,
+        is_reporting: bool = True,
     ) -> None:
         self._boom, self.limits, self._state, self._channels = boom, limits, state, channels
         self._judge, self._told_counts = judge, counts
@@ -66,6 +68,7 @@ class BlockUpdate:
         self._events: dict[int, tuple[str, ...]] = {}
         self._due: Run | None = None  # whose newest slot is still to be judged
         self._begins_health = False  # before it is told anything
+        self._nothing = None if is_reporting else self.no_rows(0, REGULAR)
         self._held: _Held | None  # what the compiled code takes with every call
 
     @property
@@ -134,7 +137,8 @@ class BlockUpdate:
             self._told_counts["deflected"] += 1
         if not clock[BEGINS_SLOT]:
             return
-        self._drawn[at] = self._boom.drawn
+        if self._nothing is None:
+            self._drawn[at] = self._boom.drawn
         if self._judge is None:
             return
         if clock[IS_DEFLECTED]:  # what the model is not valid for accuses no sensor
@@ -228,6 +232,8 @@ class BlockUpdate:
 
         Unless `judged`, the health that is due with the last sample is left out, see `judge`.
         """
+        if self._nothing is not None:
+            return self._nothing
         if judged:
             self._take_judgement(len(stamps) - 1)
         predicted, compared = self._found.counts.tolist()

@@ -21,14 +21,17 @@ LARGEST_STAMP = 2**63  # ns
 
 
 class SampleCheck:
-    """Check of samples before the twin takes them; `drive` is the stream that drives the model."""
+    """Check of samples before the twin takes them.
 
-    def __init__(self, channels: Mapping[Stream, tuple[str, ...]], drive: Stream) -> None:
+    `drive` is the stream that drives the model. If `is_sure`, its stamps are known to be nanoseconds.
+    """
+
+    def __init__(self, channels: Mapping[Stream, tuple[str, ...]], drive: Stream, is_sure: bool = False) -> None:
         self._drive = drive
         self._shapes = {stream: (len(names),) for stream, names in channels.items()}
         self._names = {stream: f"{names[0]}..{names[-1]}" for stream, names in channels.items() if names}
         self._count, self._low, self._high = 0, LARGEST_STAMP, -LARGEST_STAMP
-        self.is_sure = False
+        self.is_sure = is_sure
 
     def checked(self, sample: Sample) -> Sample:
         """Return the sample with an int stamp and contiguous float64 values (channels,); UsageError as of `Twin.update`."""

@@ -40,7 +40,7 @@ from .blocks import CODES, REGULAR, Note, ReportBlock, SampleBlock, joined
 from .run import Run
 from .sample_check import SampleCheck
 from .stamp_check import Action, StampCheck, TimeStep, verdict_on
-from .state import FOLLOWER_ROOM, NEWEST, NONE, ROOM, SHORTEST_STEP, STATUS, UNMATCHED, Room, drop_waiting, near, new_state
+from .state import FOLLOWER_ROOM, NEWEST, NONE, ROOM, SHORTEST_STEP, STATUS, UNMATCHED, drop_waiting, near, new_state
 from .update import DONE, FAILED
 
 
@@ -62,7 +62,7 @@ class SampleTaker:
         is_live: bool = False,
         places: Mapping[str, Place] = NO_PLACES,
         lagging: Collection[Stream] = (),
-        room: Room = ROOM,
+        is_follower: bool = False,
     ) -> None:
         self.reads, self._drive, self.absent, scene = reads, reads.stream, frozenset(absent), as_scene(scene)
         if not isinstance(settings, Settings | None):
@@ -75,9 +75,10 @@ class SampleTaker:
         self.absent |= {name for name in self._channels[Stream.MOMENTS] if name not in self.places}
         self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
         self._widths = [len(names) for names in self._channels.values()]
-        self._edge = SampleCheck(self._channels, self._drive)
+        self._edge = SampleCheck(self._channels, self._drive, is_sure=is_follower)
         self.requests = Requests(self.settings)
-        self._doubted, self._room = frozenset(doubted), room
+        self._doubted, self._is_follower = frozenset(doubted), is_follower
+        self._room = FOLLOWER_ROOM if is_follower else ROOM
         self._judged = True  # health, with the present sample
         self._fault_twins: FaultTwins | None = None
         if causes and health:
@@ -101,7 +102,7 @@ class SampleTaker:
         def make(each: Hypothesis) -> Follower:
             boom = each.scene, settings.tuned(each.load(*settings.load)), self.mounts
             sensors: Any = {"absent": self.absent, "doubted": each.doubted, "places": self.places, "lagging": self.lagging}
-            twin: Follower = kind(*boom, reads=self.reads, **sensors, room=FOLLOWER_ROOM)
+            twin: Follower = kind(*boom, reads=self.reads, **sensors, is_follower=True)
             return twin
 
         return make
@@ -133,7 +134,7 @@ class SampleTaker:
         self._boom, self.plan, self.judge = boom, boom.plan, judge
         limits = limits_of(self.scene, boom, settings, self.absent, self.reads)
         parts = boom, limits, self._state, self._channels, judge
-        self._compiled = BlockUpdate(*parts, self.counts, self._room.samples)
+        self._compiled = BlockUpdate(*parts, self.counts, self._room.samples, not self._is_follower)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, max(self._widths))))
 
     def _take_over(self, stamp: int) -> list[str]:

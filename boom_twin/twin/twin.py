@@ -51,8 +51,8 @@ class Twin(SampleTaker):
         Of sensors that have one, such as ``imu_2``. The tip IMU is at the tip if it is not among them.
     lagging : collection of Stream
         Streams whose stamps are late, or early, by a time that is not known. It is estimated, see `clocks`.
-    room : Room
-        Rows of its buffers, see `boom_twin.twin.state.Room`.
+    is_follower : bool
+        True for a fault twin: its samples have been checked, and their reports are empty.
 
     Attributes
     ----------

@@ -46,6 +46,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from demo.isolation import isolated
 
 from boom_twin import load_scene, statics
+from boom_twin.analysis.equilibrium import rest_at
+from boom_twin.kernels.tables import FRAME_ANGLE
 from boom_twin.messages.cdr_decoder import stamp_in
 
 OUT = {
@@ -126,8 +128,11 @@ def source(rate_text: str, duration_text: str, *more: str) -> None:
         for row in rows:
             msg.position = array("d", row)
             templates.append(bytearray(serialize_message(msg)))
-    for force in random.normal(9.81, 0.05, 200):
-        templates.append(bytearray(serialize_message(Imu(linear_acceleration=Vector3(z=force)))))
+    angle = rest_at(scene, rest.strokes, rest.joints)[1].frames[-1, FRAME_ANGLE]
+    at_rest, sigmas = (9.81 * np.sin(angle), 9.81 * np.cos(angle), 0.0), (0.05, 0.05, 1e-3)
+    for x, z, turning in random.normal(at_rest, sigmas, (200, 3)):
+        imu = Imu(linear_acceleration=Vector3(x=x, z=z), angular_velocity=Vector3(y=turning))
+        templates.append(bytearray(serialize_message(imu)))
     print("sending", flush=True)
     stamps, began, start = [], time.monotonic(), time.time_ns()
     for k in range(int(rate * duration)):

@@ -63,3 +63,11 @@ def test_sample_by_sample_as_by_blocks():
     assert [(each.stamp, each.alarms) for each in found] == [(each.stamp, each.alarms) for each in single]
     assert "cylinder_2.k" in {alarm.cause for each in single for alarm in each.alarms}
     assert np.array_equal([each.tip_sigmas for each in found], [each.tip_sigmas for each in single])
+
+
+def test_a_fault_twin_has_the_evidence_of_a_twin_without_its_reports():
+    """Reports of a fault twin are empty, and its likelihood is that of a twin with reports, bit for bit."""
+    scene, samples = load_scene(), session(2.0)
+    block, usual, follower = block_of(samples, len(scene.joints)), Twin(scene), Twin(scene, is_follower=True)
+    assert len(usual.take(block).predictions.stamps) > 100 and len(follower.take(block).predictions.stamps) == 0
+    assert follower.evidence == usual.evidence != 0.0
