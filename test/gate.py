@@ -62,7 +62,7 @@ TIMING = re.compile(
     r"machine|^costs$|^feeding$|^on_front|step_time|time_saved|seconds|wall|twin_s$|exudyn_s$|ratio|realtime|_us$"
     r"|path|folder|out$|bag$|session$"
 )
-HEALTH = (0, 1, 3, 7)  # numbers of sessions of test/bench/health, see there
+HEALTH = (46, 82, 88, 115)  # numbers of sessions of test/bench/health: angle off, angles late, angle stuck, healthy
 
 
 def plain(value: Any) -> Any:
@@ -150,8 +150,8 @@ def hashes_of_session(session: Path) -> dict[str, str]:
 def verdict(drawn: int) -> str:
     """Return the alarms of a drawn session of the health bench as text."""
     row = row_of(drawn)
-    alarms = ", ".join(f"{channel} {kind} {since:.2f} s" for channel, kind, since, *_ in row["alarms"])
-    return f"{row['fault'] or 'healthy'}, {row['kind']}: {alarms or 'no alarm'}"
+    alarms = ", ".join(f"{channel} {kind} {since:.2f} s" for channel, kind, _, since, *_ in row["alarms"])
+    return f"{' '.join(row['faults']) or 'healthy'}, {' '.join(row['loads']) or 'quiet'}: {alarms or 'no alarm'}"
 
 
 def spent(task: Callable[[], object]) -> tuple[float, float]:

@@ -152,12 +152,11 @@ def lengths(found: dict[str, list[float]]) -> Values:
     return {f"lengths: {name}": text.format(*row[:5]) for name, row in found.items()}
 
 
-def health(found: dict[str, int]) -> Values:
-    """Read what test/bench/health/run.py leaves."""
-    false, reported = ((found[each], found[of]) for each, of in (
-        ("healthy with an alarm", "healthy"), ("failing reported", "failing"),
-    ))  # fmt: skip
-    return {"health": f"{false[0]} of {false[1]}; {reported[0]} of {reported[1]}"}
+def health(found: dict[str, dict[str, int]]) -> Values:
+    """Read what test/bench/health/run.py leaves: healthy sessions, and sensors that fail by themselves."""
+    healthy, failing = found["healthy"], [each for name, each in found.items() if re.search("stuck|noisy|spikes|dropout", name)]
+    missed, count = (sum(each[key] for each in failing) for key in ("missed", "count"))
+    return {"health": f"{healthy['count'] - healthy['right']} of {healthy['count']}; {count - missed} of {count}"}
 
 
 def soak(found: dict[str, float]) -> Values:

@@ -118,22 +118,30 @@ def bundled(scene: Scene) -> Programme:
     return random_programme(scene, posture, BUNDLED_DURATION, 0)
 
 
-def random_programme(scene: Scene, posture: str, duration: float, seed: int) -> Programme:
+def random_programme(
+    scene: Scene,
+    posture: str,
+    duration: float,
+    seed: int,
+    holds: tuple[float, float] = HOLD,
+    spans: tuple[float, float] = DURATION,
+) -> Programme:
     """Draw moves from `posture` of one to three cylinders at once, in range and slower than `TIP_SPEED` at the tip.
 
-    There are holds between, and one after the last move, within `duration` (s).
+    There are holds between, and one after the last move, within `duration` (s). Bounds of their times are `holds` and of those
+    of moves `spans`, s.
     """
     rng = np.random.default_rng(seed)
     first = strokes_of_posture(scene, posture)
     now, time, moves = first.copy(), FIRST_HOLD, list[Move]()
     while True:
-        span = rng.uniform(*DURATION)
-        if time + span + HOLD[0] > duration:
+        span = rng.uniform(*spans)
+        if time + span + holds[0] > duration:
             return Programme(tuple(first.tolist()), tuple(moves))
         count = int(rng.integers(1, 1 + min(3, len(now))))
         aim = _reachable(scene, now, rng.choice(len(now), count, replace=False).tolist(), span, rng)
         moves += [Move(int(i), time, span, float(aim[i])) for i in np.flatnonzero(aim != now)]
-        now, time = aim, time + span + rng.uniform(*HOLD)
+        now, time = aim, time + span + rng.uniform(*holds)
 
 
 def through_postures(scene: Scene, postures: Sequence[str], duration: float, acceleration: float) -> Programme:

@@ -47,6 +47,14 @@ def test_programmes_stay_in_range_and_slow_enough(programme):
     assert 0.3 < fastest < 1.3
 
 
+def test_holds_and_moves_last_as_long_as_asked():
+    moves = random_programme(SCENE, "arch", 60.0, 0, (0.7, 4.0), (0.5, 2.0)).moves
+    starts, ends = (np.unique([getattr(each, name) for each in moves]) for name in ("start", "end"))
+    spans, holds = ends - starts, starts[1:] - ends[:-1]
+    assert len(spans) > 10 and 0.5 <= spans.min() < spans.max() <= 2.0 and 0.7 <= holds.min() < holds.max() <= 4.0
+    assert 0.7 <= 60.0 - ends[-1] <= 6.0
+
+
 @pytest.mark.parametrize("sections", [1, 2, 3])
 def test_another_boom_makes_moves_within_its_own_ranges(sections):
     postures = {"low": SCENE.postures["arch"][:sections]}
