@@ -36,11 +36,11 @@ def _check(args: Namespace) -> int:
     from ..config.yaml_text import whole_text
     from ..offline.commissioning import commission
     from ..system.atomic_files import check_target, write_atomic
-    from .output import print_result
+    from .output import open_session_scene, print_result
 
     if args.out is not None:
         check_target(args.out, [Path(args.check)])
-    found = commission(args.check, args.scene, args.mapping, window_of(args))
+    found = commission(args.check, open_session_scene(args.check, args.scene), args.mapping, window_of(args))
     text = whole_text(found.document) if found.has_proposal else ""
     if args.out is not None and text:
         write_atomic(args.out, text)

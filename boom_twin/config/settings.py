@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, ValidationInfo, model_validator
 from pydantic.fields import FieldInfo
 
 from ..errors import UsageError
@@ -17,7 +17,6 @@ from ..sensor_kinds import SensorKind
 from ..types import StrokeReading
 from .yaml_text import read_plain
 
-Table = TypeVar("Table", bound=BaseModel)
 _GONE = ("jerk_density", "lag", "stroke_agility", "step", "look_step", "step_tip_error", "step_acceleration_error", "rho")
 RETIRED = dict.fromkeys(
     (*_GONE, "section_deviation"), "without effect since 0.2.0, whose filter adapts by itself: leave it out"
@@ -77,20 +76,35 @@ def _dotted(values: Any, block: str = "") -> Iterator[tuple[str, Any]]:
             yield f"{block}{key}", value
 
 
+class _Table(BaseModel):
+    """Table of settings. A value out of bounds or unknown raises UsageError."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _checked(cls, values: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Self:
+        try:
+            return handler(values)
+        except ValidationError as error:
+            source, others = info.context or (cls.__name__, ())
+            lines = []
+            for e in error.errors():
+                name = ".".join(map(str, e["loc"]))
+                told = e["msg"]
+                if e["type"] == "extra_forbidden":
+                    told = f"unknown. The nearest is `{nearest(name, [*cls.model_fields, *others])}`"
+                lines.append(f"{name} = {e['input']!r}: {RETIRED.get(name, told)}")
+            known = ", ".join(cls.model_fields)
+            raise UsageError(f"{source}: " + "; ".join(lines) + f". Known parameters: {known}.") from None
+
+
+Table = TypeVar("Table", bound=_Table)
+
+
 def checked(table: type[Table], values: dict[str, Any], source: str, others: Iterable[str] = ()) -> Table:
     """Return a table with these values. UsageError names every value out of bounds or unknown here and among `others`."""
-    try:
-        return table(**values)
-    except ValidationError as error:
-        lines = []
-        for e in error.errors():
-            name = ".".join(map(str, e["loc"]))
-            told = e["msg"]
-            if e["type"] == "extra_forbidden":
-                told = f"unknown. The nearest is `{nearest(name, [*table.model_fields, *others])}`"
-            lines.append(f"{name} = {e['input']!r}: {RETIRED.get(name, told)}")
-        known = ", ".join(table.model_fields)
-        raise UsageError(f"{source}: " + "; ".join(lines) + f". Known parameters: {known}.") from None
+    return table.model_validate(values, context=(source, others))
 
 
 def nearest(name: str, known: Sequence[str]) -> str:
@@ -114,10 +128,8 @@ def is_live(field: FieldInfo) -> bool:
     return isinstance(field.json_schema_extra, dict) and bool(field.json_schema_extra["live"])
 
 
-class Thresholds(BaseModel):
+class Thresholds(_Table):
     """Thresholds of ``/diagnostics``, in SI units. They can change at any time and do not affect the prediction."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     raise_after: float = setting(2.0, "s", NOT_NEGATIVE, "time beyond a limit before its level is raised", True)
     clear_after: float = setting(5.0, "s", NOT_NEGATIVE, "time back below a limit before its level is cleared", True)
@@ -161,10 +173,8 @@ STROKE_RATE = 0.5
 """Upper bound of a cylinder's speed, m/s."""
 
 
-class Settings(BaseModel):
+class Settings(_Table):
     """Settings of the twin, in SI units. ``msg_config/twin.yaml`` has the defaults and explains each setting."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     stroke_sigma: float = setting(2.0e-5, "m", NOT_NEGATIVE, "standard deviation of the noise of a stroke transducer")
     stroke_resolution: float = setting(5.0e-6, "m", POSITIVE, "resolution of a stroke transducer")

@@ -81,7 +81,7 @@ class TwinWatch:
 
     def acknowledge(self) -> str:
         """Acknowledge the alarms of the rig's health; return the ended ones, now released, in words."""
-        return "health is not judged" if self.health is None else self.health.acknowledge()
+        return "no alarm has ended: health was not judged" if self.health is None else self.health.acknowledge()
 
     def broken(self, reason: str) -> None:
         """Count a message that could not be handled at all."""

@@ -119,6 +119,7 @@ class WiringMonitor:
                 if stream is not Stream.STROKES and (rows := block.readings(stream)) is not None:
                     means[stream] = np.where(failing[stream] & self._right[stream], np.nan, means_of(rows.raw))
             self._blocks.append((block.start, means))
+            self._silent = {s: failing[s] & np.isnan(means.get(s, np.nan)) for s in self._channels}
         self._age += 1
         if self._age in CHECKS:
             self._check()
@@ -148,12 +149,13 @@ class WiringMonitor:
             self._search = self._age + DELAY, self._worker.submit(check, RestModel(*boom), self._declared, window)
 
     def _window(self) -> Window:
-        """Return the means of all blocks since the start by stream and channel."""
+        """Return the means of all blocks since the start by stream and channel; NaN for sensors that have stopped."""
         found: dict[Stream, dict[str, Series]] = {}
         for stream, names in self._channels.items():
             rows = [(start, means[stream]) for start, means in self._blocks if stream in means]
             stamps = np.array([start for start, _ in rows], np.int64)
             columns = np.array([values for _, values in rows]).reshape(len(rows), len(names)).T
+            columns[self._silent[stream]] = np.nan
             found[stream] = {name: Series(stamps, column) for name, column in zip(names, columns, strict=True)}
         return found
 

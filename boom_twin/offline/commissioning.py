@@ -103,7 +103,7 @@ def commission(
     Raises
     ------
     BagError
-        The session cannot be read, or its messages do not name all cylinders.
+        The session cannot be read, is of another boom, or its messages do not name all cylinders.
     UsageError
         Scene or mapping have faults.
     """
@@ -127,6 +127,10 @@ def commission(
         without = f": {', '.join(silent)} never had a value" if silent else ""
         lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes{without}"
         raise BagError(f"{lacking}. Give the boom's scene by --scene, or the session's mapping.")
+    if found.is_other_boom:
+        off = ", ".join(each.channel for each in found.verdicts if each.is_wrong and each.stream is Stream.ANGLES)
+        told = f"{session.path}: {off} and the IMU agree with each other, and not with what the strokes say"
+        raise BagError(f"{told}. The scene ({own.source}) is of another boom. Give the boom's own by --scene.")
     _mend(document, found)
     absent = [each.channel for each in found.verdicts if found.lacks(each) and each.channel not in mapped.topics.absent]
     for channel in absent:

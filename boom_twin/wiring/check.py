@@ -30,6 +30,7 @@ from .hypotheses import (
     declared_costs,
     force_cube,
     gravity_hypotheses,
+    other_boom,
     read_alike,
     si,
     stroke_cube,
@@ -68,6 +69,7 @@ class Checked(NamedTuple):
     verdicts: tuple[Verdict, ...]
     moved: bool
     tables: Mapping[Stream, Table]
+    is_other_boom: bool  # the scene's linkages contradict angles and IMUs, which agree
 
     def lacks(self, verdict: Verdict) -> bool:
         """Return True if a channel is in no message, while others of its stream are read as declared."""
@@ -112,7 +114,7 @@ def check(model: RestModel, declared: Declared, window: Window, is_quick: bool =
         return None
     moved = bool((np.ptp(strokes.values, axis=0) > MOVED * np.abs(strokes.values).max()).any())
     checker = _Checker(model, declared, tables, moved_weight if moved else still_weight, is_quick)
-    return Checked(checker.verdicts(), moved, tables) if checker.found else None
+    return Checked(checker.verdicts(), moved, tables, checker.is_other_boom) if checker.found else None
 
 
 class _Checker:
@@ -123,13 +125,14 @@ class _Checker:
     ) -> None:
         self._model, self._scene, self._declared, self._tables, self._weight = model, model.scene, declared, tables, weight
         self._limit = weight * (MOST - WRONG) + ANY_ZERO  # nats, largest cost of explained readings
-        self._is_quick = is_quick
+        self._is_quick, self._to_other_boom, self.is_other_boom = is_quick, np.inf, False
         usual, cost = tuple(declared[Stream.STROKES]), self._declared_cost()
         self.found = [] if cost is None else [self._explained(usual, cost)]
         wrong = [any(part.wrong) for each in self.found for part in each.parts.values()]
         if not is_quick and (cost is None or cost > WRONG or any(wrong)):
             found = [self._explained(strokes, prior) for strokes, prior in self._stroke_explanations().items()]
             self.found = sorted(found, key=lambda each: each.cost)
+            self._compare_other_boom()
 
     def _declared_cost(self) -> float | None:
         """Return the prior cost of the declared strokes, None if a name has no readings."""
@@ -179,9 +182,7 @@ class _Checker:
         return {strokes: prior for strokes, (_, prior) in kept}
 
     def _explained(self, strokes: tuple[Channel, ...], prior: float) -> _Explanation:
-        table, units = self._tables[Stream.STROKES], SENSORS[Stream.STROKES].units
-        columns = [si(each, units, table.values[:, table.names.index(each.name)]) for each in strokes]
-        expected = self._model.expected(np.column_stack(columns))
+        expected = self._expected(strokes)
         parts: dict[Stream, _Part] = {}
         if (angles := self._tables.get(Stream.ANGLES)) is not None:
             own = self._declared[Stream.ANGLES]
@@ -196,6 +197,29 @@ class _Checker:
             if imu is not None and axes and all(each.name in imu.names for each in axes):
                 parts[stream] = self._gravity_part(gravity_hypotheses(imu, axes, gravity, self._weight))
         return _Explanation(strokes, parts, prior + sum(part.cost for part in parts.values()))
+
+    def _expected(self, strokes: tuple[Channel, ...]) -> Expected:
+        table, units = self._tables[Stream.STROKES], SENSORS[Stream.STROKES].units
+        columns = [si(each, units, table.values[:, table.names.index(each.name)]) for each in strokes]
+        return self._model.expected(np.column_stack(columns))
+
+    def _compare_other_boom(self) -> None:
+        """Compare the best explanation with another boom, whose angles and IMUs are as declared and agree with each other.
+
+        Without an IMU, another boom is not told from encoders whose zeros nobody set.
+        """
+        best, table, declared = self.found[0], self._tables.get(Stream.ANGLES), self._declared[Stream.ANGLES]
+        if table is None or any(each.name not in table.names for each in declared):
+            return
+        expected = self._expected(best.strokes)
+        cost, turns = other_boom(table, declared, expected)
+        unset = other = cost + best.cost - best.parts[Stream.ANGLES].cost
+        for stream in best.parts.keys() & expected.gravity.keys():
+            gravity = expected.gravity[stream] * np.exp(-1j * turns[:, self._model.sections[stream]])
+            ways = gravity_hypotheses(self._tables[stream], self._declared[stream], gravity, self._weight)
+            other += ways[0].cost - best.parts[stream].cost
+        self._to_other_boom = other - best.cost
+        self.is_other_boom = min(best.cost, unset) - other >= SURE
 
     def _part(self, stream: Stream, expected: Expected, cube_of: Callable[[], Cube]) -> _Part:
         doubtful = 1.0  # nats per block above which other ways are compared, as an error may show in few postures
@@ -249,6 +273,7 @@ class _Checker:
                     each.cost - best.cost for each in self.found[1:]
                     if each.parts[stream].best[j] != part.best[j] and part.best[j] is not None
                 ]  # fmt: skip
+                rivals += [self._to_other_boom] if stream is not Stream.FORCES and part.best[j] != own else []
                 margin = min([part.margin(j), *rivals, *(unsettled if stream is not Stream.ANGLES else ())])
                 flags = part.wrong[j], part.explained[j], part.has_no_gravity
                 found.append(Verdict(stream, names[stream][j], own, part.best[j], margin, *flags))

@@ -24,6 +24,7 @@ NEAR_ZERO = math.radians(5.0)  # tolerance of zeros (left to calibration) and of
 UNIT, OTHER_UNIT, SIGN, NAME, EXTRA_NAME = 4.0, 9.0, 4.0, 3.0, 6.0  # nats, prior costs of changes
 REVERSED, PIN_TO_PIN, HALF_TURN, SMALL_ZERO, ANY_ZERO = 6.0, 3.0, 5.0, 6.0, 9.0  # pin to pin is likelier than inches
 ABSOLUTE, TURNED, NO_GRAVITY = 4.0, 8.0, 4.0
+OTHER_BOOM, OTHER_LINKAGE = 12.0, math.radians(20.0)  # nats; rad, standard deviation of an angle by the linkage of another boom
 IMPOSSIBLE = 1e6  # nats
 OUTSIDE = 60.0  # nats for strokes beyond the travel
 SLACK = 0.02  # allowed stroke beyond the travel, relative to it
@@ -140,12 +141,28 @@ def declared_costs(
             costs.append(None)
             continue
         readings = si(own, SENSORS[stream].units, table.values[:, table.names.index(own.name)])
-        right, sigma = expected.forces[:, j], _force_error(expected, j)
+        off = (readings - expected.forces[:, j]) / _force_error(expected, j)
         if stream is Stream.ANGLES:
-            right, sigma = expected.angles[_at_rest(own.absolute)][:, j], np.array(ANGLE_ERROR)
-            readings = right + np.remainder(readings - right + math.pi, TAU) - math.pi
-        costs.append(float(misfit(((readings - right) / sigma)[np.isfinite(readings)], weight)))
+            off = _angle_errors(readings, own, expected, j) / ANGLE_ERROR
+        costs.append(float(misfit(off[np.isfinite(readings)], weight)))
     return costs
+
+
+def _angle_errors(readings: Array, own: Channel, expected: Expected, j: int) -> Array:
+    """Return readings (blocks,) of an angle less the expected ones, less whole turns, rad."""
+    return np.remainder(readings - expected.angles[_at_rest(own.absolute)][:, j] + math.pi, TAU) - math.pi
+
+
+def other_boom(table: Table, declared: Sequence[Channel], expected: Expected) -> tuple[float, Array]:
+    """Return the cost of angles as declared at a boom with other linkages, and by what they turn its sections (blocks, n)."""
+    cost, turns, turn = OTHER_BOOM, list[Array](), np.zeros(len(table.values))
+    for j, own in enumerate(declared):
+        readings = si(own, SENSORS[Stream.ANGLES].units, table.values[:, table.names.index(own.name)])
+        off = _angle_errors(readings, own, expected, j)
+        cost += math.log(OTHER_LINKAGE / ANGLE_ERROR) + 0.5 * (float(np.nanmean(off)) / OTHER_LINKAGE) ** 2
+        turn = off + (0.0 if own.absolute else turn)
+        turns.append(turn)
+    return cost, np.column_stack(turns)
 
 
 def _at_rest(mount: Mount | None) -> Mount | None:

@@ -217,6 +217,7 @@ class RestModel:
         self._measured = measurement_of(self._plan, Settings(), mounting_of(self._plan, ()), places)
         streams, channels = tuple(Stream), self._measured.channels
         self._imus = {streams[row.stream]: int(row.site) for row in channels[channels.kind == READS_ACCELERATION]}
+        self.sections = {stream: int(self._measured.sites[site].section) for stream, site in self._imus.items()}
         self._known: dict[bytes, Array] = {}  # rows of `_at_rest`, by strokes
 
     def expected(self, strokes: Array) -> Expected:

@@ -56,6 +56,15 @@ def test_what_is_not_determined_is_not_almost_certain() -> None:
         assert ("perhaps" in alarm.evidence) == (alarm.ranked[0].probability < 0.999)
 
 
+def test_sensors_that_stopped_are_not_judged_by_what_they_read_before() -> None:
+    """The angles' first reading is 0; a second source, which publishes zeros, then stops both."""
+    zeros = rewired(Stream.ANGLES, lambda v: 0.0 * v, 8.0)
+    first = next(each for each in zeros if each.stream is Stream.ANGLES)
+    samples = [each for each in zeros if each is first or each.stream is not Stream.ANGLES]
+    kinds = {(alarm.kind, alarm.channel) for _, alarm in run(samples).states()}
+    assert kinds == {("dropout", f"joint_{i}") for i in range(1, 5)}
+
+
 def test_a_start_with_right_readings_ends_it() -> None:
     wrong, right = rewired(Stream.ANGLES, lambda v: v[SWAP_23], 6.0), session(8.0)
     later = wrong[-1].stamp - right[0].stamp + 60_000_000_000  # after a pause the boom starts from rest

@@ -17,6 +17,7 @@ from boom_twin import (
     BoomTwinError,
     Sample,
     SessionWriter,
+    Settings,
     Stream,
     TimeWindow,
     Twin,
@@ -150,6 +151,8 @@ def test_readings_that_no_rig_can_give_are_refused(fault: str) -> None:
 MISUSES: dict[str, tuple[Callable[[], Any], str]] = {
     "no sample": (lambda: Twin().update(3), "sample is 3. Give Sample(Stream.STROKES, stamp_ns"),  # type: ignore[arg-type]
     "settings": (lambda: Twin(None, {"health": False}), "give Settings(name=value, ..)"),  # type: ignore[arg-type]
+    "setting": (lambda: Settings(gap=-1.0), "Settings: gap = -1.0: Input should be greater than or equal to"),
+    "unknown setting": (lambda: Settings(gpa=1.0), "gpa = 1.0: unknown. The nearest is `gap`"),  # type: ignore[call-arg]
     "sensor": (lambda: Twin().rezero("joint_9"), "'joint_9': no sensor of this boom. Give tip_imu, or one of cylinder_1,"),
     "start": (lambda: TimeWindow(float("nan"), 2.0), "start = nan: must be a number of seconds, at least 0."),
     "duration": (lambda: TimeWindow(0.0, -1.0), "duration = -1.0: must be a number of seconds, at least 0."),

@@ -15,6 +15,7 @@ from recordings import write_session
 from session_readings import rows_in
 
 from boom_twin import Stream
+from boom_twin.scene.load import default_text
 
 BAGS = Path(__file__).parents[2] / "bags"
 G = 9.80665
@@ -164,3 +165,23 @@ def test_a_session_of_another_boom_is_refused(rows: Rows, tmp_path: Path, capsys
     assert "no time in which all 4 cylinders" in capsys.readouterr().err
     assert main(["mapping", "--out", "x.yaml"]) == 1
     assert "Add --check BAG" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("has_imu", [True, False])
+def test_linkages_of_another_boom_are_no_zeros(
+    has_imu: bool, rows: Rows, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Linkages are larger by 15 %: all angles but the first are 8 deg off what the strokes say, and the IMU their sum."""
+    scene, other = yaml.safe_load(default_text()), tmp_path / "other.yaml"
+    for joint in scene["joints"][1:]:
+        joint |= {key: [1.15 * each for each in joint[key]] for key in "RCDE" if key in joint}
+        joint |= {key: 1.15 * joint[key] for key in ("lL", "lR")}
+        joint["cylinder"] |= {key: 1.15 * joint["cylinder"][key] for key in ("closed_length", "max_stroke")}
+    other.write_text(yaml.safe_dump(scene))
+    bag = written(rows if has_imu else rows._replace(imu=None), tmp_path / "bag")
+    assert main(["mapping", "--check", str(bag), "--scene", str(other)]) == has_imu
+    told = capsys.readouterr()
+    if has_imu:
+        assert "joint_2, joint_3, joint_4 and the IMU agree" in told.err and f"({other}) is of another boom" in told.err
+    else:
+        assert told.out.count("not determined") == 3 and "nothing to propose" in told.out

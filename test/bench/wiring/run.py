@@ -220,9 +220,9 @@ def judged(number: int) -> tuple[str, bool, Counter[str]]:
     rows = len(next(iter(wired.columns[STROKES].values())))
     stamps = 10**18 + np.arange(rows) * round(STEP * 1e9)
     window = {s: {name: Series(stamps, each) for name, each in own.items()} for s, own in wired.columns.items()}
-    found = check(RestModel(wired.scene, StrokeReading.LENGTH), {s: wired.declared(s) for s in Stream}, window)
+    found = check(RestModel(wired.scene, StrokeReading.LENGTH), {s: wired.declared(s) for s in wired.names}, window)
     counts: Counter[str] = Counter()
-    assert found is not None
+    assert found is not None and not found.is_other_boom, number
     for verdict in found.verdicts:
         truth = wired.truth.get(verdict.channel, verdict.declared)
         if truth == verdict.declared:
