@@ -41,6 +41,7 @@ from .states import (
     FED,
     OPEN,
     PREDICTION,
+    RESTARTS,
     VALVES,
     all_states,
     drive_place,
@@ -211,6 +212,7 @@ def leave_contradiction(p, f, size):
         if apart * apart > CONTRADICTION * CONTRADICTION * variance_of(f.row, f.spread[PREDICTION], f.gain, size):
             f.status[FED] = 0
     if f.status[FED] == 0:
+        f.status[RESTARTS] += 1
         for c in range(f.excess.shape[0]):
             f.excess[c] = min(f.excess[c] * f.excess[c], MOST_EXCESS)
 

@@ -17,7 +17,7 @@ VALVES, OPEN, BURST = range(3)  # models of the prediction
 ALL_VALVES, ALL_OPEN, ALL_BURST = range(3, 6)  # models of the estimate
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
 LOADS = 6  # states of the load at the tip: along x and y its fast part (2), its slow part (2), rates of the fast part (2)
-FED, FED_STAMP = range(2)  # of `status`
+FED, FED_STAMP, RESTARTS = range(3)  # of `status`
 DELAYED = 128  # states at most that hold readings of late streams, see `delayed`
 
 
@@ -44,7 +44,7 @@ class Filters(NamedTuple):
     mean, spread : (2, s), (2, s, s) of the mixtures. load2 : (2, 2) variances of the fast load, N^2, of prediction and
     estimate, along x and y.
     jerk : (n,) m^2/s^5. is_open, still : (2, n) 1 where a valve is believed open, s since its drive began to stand still.
-    status : (2,) whether the estimate has readings of its own, stamp of the newest of these.
+    status : (3,) whether the estimate has readings of its own, stamp of the newest of these, restarts by a contradiction.
     masked, deaf : (c,), (n,) measured channels that the estimate, and strokes that no model is to use. noise : variances.
     excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
     drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
@@ -123,7 +123,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
     return Filters(
         x=np.zeros((6, states)), p=np.zeros((6, states, states)), chances=np.zeros(6), mean=np.zeros((2, states)),
         spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros((2, n), np.int64),
-        still=np.zeros((2, n)), status=np.zeros(2, np.int64), masked=np.zeros(channels, np.bool_),
+        still=np.zeros((2, n)), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
         sway2=np.zeros(n), apart=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,

@@ -56,6 +56,13 @@ class Follower(Protocol):
         """Log likelihood of all readings."""
 
     @property
+    def restarts(self) -> int:
+        """How often the estimate was restarted because the lengths contradicted it."""
+
+    def restart_estimate(self) -> None:
+        """Restart the estimate from the prediction with the next step."""
+
+    @property
     def requests(self) -> Any:
         """Requested changes that wait for the next stroke sample."""
 
@@ -227,9 +234,21 @@ class FaultTwins:
         leaks = [] if self._reads is StrokeReading.ANGLE else self._creep.take(second.stamp, second.block)
         if leaks:
             self._decide_anew()
+        restarts = self._twins[0].restarts
         for each, twin in zip(self._hypotheses, self._twins, strict=True):
             _feed(twin, each, second)
+        if self._twins[0].restarts > restarts:
+            self._settle()
         return [*leaks, *self._decided(second.stamp)]
+
+    def _settle(self) -> None:
+        """Restart the estimates of all twins, as that of the boom as believed; leave out seconds until they have settled.
+
+        A restarted filter has forgotten zeros and load. Against it, any hypothesis would gain.
+        """
+        self._age = 0
+        for twin in self._twins:
+            twin.restart_estimate()
 
     def _decided(self, stamp: int) -> list[Alarm]:
         """Return the alarms of named faults that begin or end with the evidence of a second."""

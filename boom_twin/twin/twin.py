@@ -88,6 +88,15 @@ class Twin(SampleTaker):
         self.requests.zero({})  # no new zeros: this marks a change as due with the first strokes
 
     @property
+    def restarts(self) -> int:
+        """How often the estimate was restarted because the lengths contradicted it."""
+        return self._boom.restarts
+
+    def restart_estimate(self) -> None:
+        """Restart the estimate from the prediction with the next step."""
+        self._boom.restart_estimate()
+
+    @property
     def evidence(self) -> float:
         """Log likelihood of all readings, up to a constant that depends on the samples alone."""
         return self._boom.evidence

@@ -107,11 +107,15 @@ class Follower:
     """A twin whose evidence grows by nats a second that depend on its boom and on the stamp; keeps the changes it is told."""
 
     def __init__(self, rate):
-        self.evidence, self.changes, self._rate = 0.0, [], rate
+        self.evidence, self.restarts, self.changes, self._rate = 0.0, 0, [], rate
 
     def take(self, block):
         """Take a second of samples."""
         self.evidence += self._rate(int(block.stamps[0]) // SECOND)
+
+    def restart_estimate(self):
+        """Forget what others may not know better."""
+        self._rate = lambda _: 0.0
 
     def leave_out(self, masked, strokes):
         """Leave out nothing."""
@@ -164,6 +168,21 @@ def test_a_cause_that_helps_at_any_size_is_not_named():
     """A boom as believed that has lost the motion is no evidence for a fault that helps with 2 % as much as with 25 %."""
     twins = FaultTwins(load_scene(), lambda each: Follower(lambda _: 50.0 * (spring_of(each) > 0.01)), SETTINGS)
     assert taken(twins, 40) == []
+
+
+def test_a_boom_as_believed_that_had_to_restart_is_no_evidence():
+    """In second 20 its estimate forgets zeros and load. Each twin that has not would gain by what it still knows."""
+
+    class Restarted(Follower):
+        def take(self, block):
+            super().take(block)
+            self.restarts += int(block.stamps[0]) // SECOND == 20
+
+    def made(each):
+        lost = spring_of(each)
+        return Restarted(lambda _: 0.0) if lost == 0.0 else Follower(lambda second: 100.0 * lost * (second >= 20))
+
+    assert taken(FaultTwins(load_scene(), made, SETTINGS), 60) == []
 
 
 def test_a_fault_comes_and_goes():
