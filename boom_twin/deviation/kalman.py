@@ -25,7 +25,10 @@ def put_weight(f, row, place, weight):
 
 @inner
 def make_transition(p, f, h):
-    """Write the transition of the boom's states over `h` (s), inputs of the modes held, and the variances all states gain."""
+    """Write the transition of the boom's states over `h` (s), inputs of the modes held, and the variances all states gain.
+
+    `f.inputs` (2 m) are the changes of modal coordinates and rates by the modal forces `f.swing`.
+    """
     n, m, load, drive = p.drives.shape[0], p.modes[0], force_place(p), drive_place(p)
     f.interval[1] = h
     f.counts[:], f.variances[:] = 0, 0.0
@@ -40,6 +43,7 @@ def make_transition(p, f, h):
         put_weight(f, m + j, j, vq)
         put_weight(f, m + j, m + j, vv)
         still, moving = (1.0 - qq) / omega2, -vq / omega2
+        f.inputs[j], f.inputs[m + j] = still * f.swing[j], moving * f.swing[j]
         for a in range(2):
             motion = p.readings[2 + n + j, n + a]
             for b in range(2):
@@ -103,6 +107,8 @@ def transit(p, f, k, size, h, loads, least2):
         f.row[i] = total
     for i in range(own):
         x[i] = f.row[i]
+    for i in range(2 * p.modes[0]):
+        x[i] += f.inputs[i]
     for i in range(own):
         add_rows(f, i, covariance, size, f.half[i])
     for i in range(own):

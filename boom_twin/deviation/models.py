@@ -91,7 +91,7 @@ def start_models(p, f, speed, swing):
     copy_model(f, VALVES, BURST, size)
     f.chances[VALVES], f.chances[OPEN], f.chances[BURST] = 0.8, 0.1, 0.1
     f.excess[:], f.ratio[:], f.shaking[:] = 1.0, 1.0, 0.0
-    f.bends[:], f.sway2[:] = 0.0, 0.0
+    f.bends[:], f.swing[:], f.sway2[:] = 0.0, 0.0, 0.0
     mix(f, PREDICTION, zero_place(p))
     follow_prediction(p, f)
     f.status[FED] = 0

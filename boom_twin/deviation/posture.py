@@ -13,6 +13,7 @@ read changes by the same columns. When the posture moves, modes follow it (`mode
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.elements.linkage import angle_of_length, cylinder_length
 from ..kernels.integrators import REST, prepare
 from ..kernels.jit import by_reference, inner, kernel
-from ..kernels.tables import FRAME_ANGLE, FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, OK, Motion
+from ..kernels.tables import BEAM, BODY, FRAME_ANGLE, FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, OK, Motion
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
@@ -58,7 +59,8 @@ class Posture(NamedTuple):
     reads_angle : whether the model is driven by angles. tilt : (n,) angle of the base, for inclinometers. gravity : (2,) m/s^2.
     slope, curvature : (n,) change of a joint's angle by its stroke, rad/m, and of that, rad/m^2.
     frames, absolute, sways : (n,) of angle sensors, see `Mounting`. roots : (n + 1,)
-    frames of the pivots and of the tip. masses : (h,) kg, kg m^2. lengths : (n,) of the sections, m. closed : (n,) m.
+    frames of the pivots and of the tip. masses : (h,) kg, kg m^2. points : (k, 2) mass points: place of x in h (y follows),
+    section. lengths : (n,) of the sections, m. closed : (n,) m.
     channels, sites, errors, psi, weights, bending : see `boom_twin.deviation.channels.Measurement`.
     behind : (1,) states of sensors' errors that the estimate has beside those of the prediction. delayed : (1,) copies of late
     readings behind these, see `boom_twin.deviation.delayed`.
@@ -92,6 +94,7 @@ class Posture(NamedTuple):
     sways: NDArray[np.bool_]
     roots: NDArray[np.int64]
     masses: Array
+    points: NDArray[np.int64]
     lengths: Array
     closed: Array
     channels: np.recarray
@@ -133,13 +136,30 @@ def new_posture(
         oil_read=np.zeros(n), reads_drive=reads is StrokeReading.DRIVE, reads_angle=reads is StrokeReading.ANGLE,
         tilt=np.where(mounting.absolute, inclination, 0.0), gravity=np.array(plan.tables.gravity), slope=np.zeros(n),
         curvature=np.zeros(n), frames=mounting.frames.astype(np.int64), absolute=mounting.absolute, sways=mounting.sways,
-        roots=roots.astype(np.int64), masses=plan.masses,
+        roots=roots.astype(np.int64), masses=plan.masses, points=np.array(list(_mass_points(plan))),
         lengths=lengths, closed=plan.closed_lengths, **measured._asdict(),
         behind=np.array([TIP_IMU_STATES + 2 * n]), delayed=np.zeros(1, np.int64),
         still=np.zeros(histories), position=np.zeros(histories), hat=np.zeros(histories),
         response=np.zeros((most, unknowns)), sides=np.zeros((2, width)),
         shifted=np.zeros((most, histories)), small=np.zeros((4, most, most)), target=np.zeros(n), rate=np.zeros(n),
     )  # fmt: skip
+
+
+def _mass_points(plan: Plan) -> Iterator[tuple[int, int]]:
+    """Yield the place of x and the section of every mass point; links and cylinders count to the section before their joint."""
+    t, section = plan.tables, -1
+    for kind, row in t.operations:
+        found = list[int]()
+        if kind == BEAM:
+            found = [t.beams[row].history + 2 * k for k in range(t.beams[row].points)]
+        elif kind == BODY:
+            found = [t.bodies[row].history]
+        elif kind in (JOINT_A, JOINT_B):
+            joint, cylinder = t.joints[row], t.cylinders[section + 1]
+            found = [each.history for each in t.links[joint.first_link : joint.first_link + joint.links]]
+            found += [each.history for each in t.parts[cylinder.first_part : cylinder.first_part + cylinder.parts]]
+        yield from ((int(place), section) for place in found if section >= 0)
+        section += kind in (JOINT_A, JOINT_B)
 
 
 @kernel

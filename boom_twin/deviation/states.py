@@ -53,7 +53,9 @@ class Filters(NamedTuple):
     lags, late : (streams,) by which stamps are late, as estimated, and by which samples arrived after their stamps at most, s.
     copies : (c,) places of late channels among the copies of one instant, -1 of others. instants : (DELAYED,) stamps of copies,
     see `delayed`.
-    bends : (sites, 2) accelerations that the curved ways of sites need, m/s^2. sway2 : (n,) square of the largest angle by
+    bends : (sites, 2) accelerations that the curved ways of sites need, m/s^2. ways : (n + 1, 4) those of pivots and tip,
+    rates (rad/s) and angular accelerations (rad/s^2) of the chords behind them. swing : (m,) modal forces by
+    these, inputs : (2 m,) changes of modal coordinates and rates in a step by them. sway2 : (n,) square of the largest angle by
     which an inclinometer lately erred, rad^2.
     places, weights, counts : (p, k), (p, k), (p,) columns of the transition matrix by row. variances : (s,) of its noise.
     motion : (sites, 9) predicted x, y, angle of every site, m and rad, their rates, their accelerations.
@@ -85,6 +87,9 @@ class Filters(NamedTuple):
     before: Array
     interval: Array
     bends: Array
+    ways: Array
+    swing: Array
+    inputs: Array
     sway2: Array
     apart: Array
     lags: Array
@@ -126,6 +131,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         still=np.zeros((2, n)), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
+        ways=np.zeros((n + 1, 4)), swing=np.zeros(modes), inputs=np.zeros(2 * modes),
         sway2=np.zeros(n), apart=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,
         late=np.zeros(len(Stream)), copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         places=np.zeros((own, 8 + n), np.int64), weights=np.zeros((own, 8 + n)), counts=np.zeros(own, np.int64),

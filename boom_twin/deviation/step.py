@@ -94,6 +94,7 @@ def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
     if not is_finite(p, f):
         return NOT_FINITE
     place_live(t, boom, live, work, p, f)
+    write_ways(live, work, p, f)
     write_prediction(t, live, p, f, h, gravity, out)
     return OK
 
@@ -185,7 +186,7 @@ def move_sites(t, live, p, f, h, gravity):
     for k in range(p.sites.shape[0]):
         motion, at = f.motion[k], site_column(p, k)
         motion[0], motion[1], motion[2] = locate(t, live, p, k)
-        write_bend(live, p, f, p.sites[k].section, motion)
+        write_bend(live, p, f, k, motion)
         f.bends[k, 0], f.bends[k, 1] = motion[6], motion[7]
         for a in range(3):
             rate_row(p, at + a, f.row)
@@ -217,29 +218,49 @@ def stroke_rate(p, f, i):
 
 
 @inner
-def write_bend(live, p, f, section, motion):
-    """Write the acceleration (x, y, angle) that a site's curved way needs at constant rates of drives and modes.
+def write_ways(live, work, p, f):
+    """Write the accelerations that the curved ways of the pivots need at constant rates, and the modal forces of all such ways.
 
-    With the turning rate w_i of the chord r_i of section i, and what w_i changes by the geometry of the linkages, a_i,
-    the site has sum_i (a_i e_z x r_i - w_i^2 r_i). The chord of its own section ends at the site.
+    With the turning rate w_i of the chord r_i of section i, and what w_i changes by the geometry of the linkages, a_i, a
+    place has the acceleration c = sum_i (a_i e_z x r_i - w_i^2 r_i). The chord of its own section ends there. So masses m whose
+    motion in mode j is s_j give the equation of that mode the force - sum m s_j . c.
     """
     n, m, drive, change = p.drives.shape[0], p.modes[0], drive_place(p), 0.0
     chords = site_column(p, p.sites.shape[0])
-    motion[6], motion[7] = 0.0, 0.0
-    for i in range(section + 1):
+    f.swing[:], f.ways[0, 0], f.ways[0, 1] = 0.0, 0.0, 0.0
+    for i in range(n):
         rate, v = 0.0, f.mean[PREDICTION, drive + n + i]
         for k in range(n):
             rate += p.readings[2 + k, chords + i] * f.mean[PREDICTION, drive + n + k]
         for j in range(m):
             rate += p.readings[2 + n + j, chords + i] * f.mean[PREDICTION, m + j]
         change += p.curvature[i] * v * v
-        one, other = live.frames[p.roots[i]], live.frames[p.roots[i + 1]]
-        x, y = other[FRAME_X] - one[FRAME_X], other[FRAME_Y] - one[FRAME_Y]
-        if i == section:
-            x, y = motion[0] - one[FRAME_X], motion[1] - one[FRAME_Y]
-        motion[6] -= rate * rate * x + change * y
-        motion[7] += change * x - rate * rate * y
-    motion[8] = change
+        f.ways[i, 2], f.ways[i, 3] = rate, change
+        end = live.frames[p.roots[i + 1]]
+        f.ways[i + 1, 0], f.ways[i + 1, 1] = bend_at(live, p, f, i, end[FRAME_X], end[FRAME_Y])
+    for k in range(p.points.shape[0]):
+        at, section = p.points[k]
+        x, y = bend_at(live, p, f, section, work.position[at], work.position[at + 1])
+        for j in range(m):
+            f.swing[j] -= p.masses[at] * p.motions[j, at] * x + p.masses[at + 1] * p.motions[j, at + 1] * y
+
+
+@inner
+def bend_at(live, p, f, section, x, y):
+    """Return the acceleration, m/s^2, that the curved way of a place of a section needs."""
+    root, rate, change = live.frames[p.roots[section]], f.ways[section, 2], f.ways[section, 3]
+    x, y = x - root[FRAME_X], y - root[FRAME_Y]
+    return f.ways[section, 0] - rate * rate * x - change * y, f.ways[section, 1] + change * x - rate * rate * y
+
+
+@inner
+def write_bend(live, p, f, k, motion):
+    """Write the acceleration (x, y, angle) of site `k` by its curved way, and by the modal forces of all such ways."""
+    motion[6], motion[7] = bend_at(live, p, f, p.sites[k].section, motion[0], motion[1])
+    motion[8] = f.ways[p.sites[k].section, 3]
+    for j in range(p.modes[0]):
+        for a in range(3):
+            motion[6 + a] += p.readings[2 + p.drives.shape[0] + j, site_column(p, k) + a] * f.swing[j]
 
 
 @inner

@@ -10,8 +10,11 @@ from oracle import booms
 from boom_twin import Scene, Settings, frequency_response, load_scene, statics
 from boom_twin.analysis.equilibrium import Equilibrium, rest_at
 from boom_twin.analysis.modal import natural_modes
-from boom_twin.deviation.posture import linearise
+from boom_twin.deviation.posture import linearise, settle_at
 from boom_twin.deviation.predictor import BoomPredictor
+from boom_twin.deviation.states import PREDICTION, drive_place
+from boom_twin.deviation.step import write_ways
+from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.types import Mount
 
 RIGID = load_scene()
@@ -84,3 +87,23 @@ def test_modes_followed_over_a_move_are_those_found_anew(boom: BoomPredictor, sc
         sign = np.sign(forces[j] @ p.forces[2 + N + j])
         assert p.forces[2 + N + j] == pytest.approx(sign * forces[j], rel=2e-3, abs=2e-3 * np.abs(forces[j]).max())
     boom.start(statics(scene, DRIVES).lengths)
+
+
+def test_modal_forces_of_curved_ways_are_those_of_the_masses_accelerations(scene: Scene) -> None:
+    """Positions of all masses at rest along a straight way of the drives: their second differences are the accelerations."""
+    found, v, h = BoomPredictor(scene, Settings()), np.array([0.03, -0.05, 0.04, 0.06]), 5e-3
+    found.start(statics(scene, DRIVES).lengths)
+    (tables, live, _, work, p, f, *_), places = found.compiled, list[np.ndarray]()
+    for step in (h, -h, 0.0):
+        assert settle_at(tables, live, work, p, DRIVES + step * v) == 0
+        place(tables, live, work)
+        places.append(work.position.copy())
+    curved = (places[0] + places[1] - 2.0 * places[2]) / h**2
+    f.mean[PREDICTION, drive_place(p) + N : drive_place(p) + 2 * N] = v
+    write_ways.py_func(live, work, p, f)
+    expected = -(p.motions * p.masses) @ curved
+    m = int(p.modes[0])
+    assert f.swing[:m] == pytest.approx(
+        expected[:m], rel=0.06, abs=0.02 * np.abs(expected).max()
+    )  # links and cylinders are approximate
+    assert np.abs(expected).max() > 0.1
