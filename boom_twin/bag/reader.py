@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +22,20 @@ from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 from ..errors import BagError
 from ..messages.type_store import other_than_jazzy
 from ..system.received_files import holds_file, sha256_of
-from . import csv_file, mcap_file, other_storages
 from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata, refuse_packed
 from .session_file import CDR, WHOLE, SessionBlocks, SessionFile, TimeWindow, compare_counts
 from .session_model import incompleteness, kept_origin
 
-SUMMARISE: dict[str, Callable[[Path], SessionFile]] = {
-    ".mcap": mcap_file.summarise,
-    ".db3": other_storages.summarise_sqlite,
-    ".bag": other_storages.summarise_ros1,
-    ".csv": csv_file.summarise,
+SUMMARISE = {
+    ".mcap": ("mcap_file", "summarise"),
+    ".db3": ("other_storages", "summarise_sqlite"),
+    ".bag": ("other_storages", "summarise_ros1"),
+    ".csv": ("csv_file", "summarise"),
 }
-"""Function for each suffix. Files of rosbag2 may lie in a folder, see `STORAGES`; any other file is a session by itself."""
+"""Module and function for each suffix; only the module that is needed is imported.
+
+Files of rosbag2 may lie in a folder, see `STORAGES`; any other file is a session by itself.
+"""
 
 
 def summarise(path: Path) -> SessionFile:
@@ -41,7 +44,9 @@ def summarise(path: Path) -> SessionFile:
     Raise BagError if the file is missing, of another kind, cut off or damaged.
     """
     refuse_packed(path)
-    return SUMMARISE.get(path.suffix.lower(), SUMMARISE[".mcap"])(path)
+    module, function = SUMMARISE.get(path.suffix.lower(), SUMMARISE[".mcap"])
+    found: SessionFile = getattr(import_module(f".{module}", __package__), function)(path)
+    return found
 
 
 def is_session(path: Path) -> bool:

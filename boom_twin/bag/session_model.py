@@ -239,7 +239,7 @@ def scene_of(session: Path, given: SceneSource | SessionScene = None) -> Session
     """Return the scene of a session: what is `given`, else from its ``session.yaml``, else from the package."""
     if given is not None:
         found = scene_from(given)
-        return replace(found, oddities=(*found.oddities, *_other_values(session, found.scene)))
+        return replace(found, oddities=(*found.oddities, *_other_values(session, found)))
     if (own := kept(session, "scene", "--scene")) is None:
         return scene_from(None)
     recorded, digest = kept(session, "scene_sha256", "--scene"), sha256(own.text)
@@ -254,14 +254,16 @@ def scene_of(session: Path, given: SceneSource | SessionScene = None) -> Session
     return SessionScene(scene, own.text, own.source, tuple(oddities))
 
 
-def _other_values(session: Path, scene: Scene) -> list[Fault]:
-    """Return a note if `scene` has other values than the scene that the session keeps, as that of another boom has."""
+def _other_values(session: Path, given: SessionScene) -> list[Fault]:
+    """Return a note if a scene has other values than the scene that the session keeps, as that of another boom has."""
     try:
         own = kept(session, "scene", "--scene")
-        others = [] if own is None else differences(examine_text(own.text, own.source)[0], scene)
+        if own is None or own.text == given.text:
+            return []
+        others = differences(examine_text(own.text, own.source)[0], given.scene)
     except (BagError, SceneError):
         return []  # whoever reads that scene is told
-    if own is None or not others:
+    if not others:
         return []
     (place, value), more = others[0], f", and {len(others) - 1} more" if len(others) > 1 else ""
     told = f"differs from the scene of the session ({own.source}){more}"

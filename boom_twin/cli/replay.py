@@ -103,13 +103,14 @@ def flat(summary: dict[str, Any]) -> dict[str, Any]:
 
 def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
     from ..offline.history import draw
-    from ..report.page import write_report
     from ..report.quantities import FILE_NAME as QUANTITIES
 
     files = [out / QUANTITIES]
     if not args.no_pictures:
         files += draw(found.result, found.history, found.scene, out)
     if args.report:
+        from ..report.page import write_report
+
         files.append(write_report(found, out))
     return files
 

@@ -110,14 +110,14 @@ def transit(p, f, k, size, h, loads, least2):
     for i in range(2 * p.modes[0]):
         x[i] += f.inputs[i]
     for i in range(own):
-        add_rows(f, i, covariance, size, f.half[i])
+        multiply_row(f, i, covariance, size, f.half[i])
     for i in range(own):
         for j in range(own):
             f.turned[i, j] = f.half[j, i]
         for j in range(own, size):
             covariance[i, j] = covariance[j, i] = f.half[i, j]
     for i in range(own):
-        add_rows(f, i, f.turned, i + 1, covariance[i])
+        multiply_row(f, i, f.turned, i + 1, covariance[i])
         for j in range(i):
             covariance[j, i] = covariance[i, j]
     if size > own:
@@ -152,7 +152,7 @@ def drift_lags(p, x, covariance, size, h):
 
 
 @inner
-def add_rows(f, i, right, size, found):
+def multiply_row(f, i, right, size, found):
     """Write row `i` of the product of the transition matrix and `right`, its first `size` entries, four terms at a time."""
     for j in range(size):
         found[j] = 0.0

@@ -4,8 +4,8 @@ The filter of a twin gives the log likelihood of all readings (`BoomPredictor.ev
 fault, or lets a sensor's zero drift. `causes` decides by the gains in likelihood. A named fault becomes part of the boom as
 believed. So a second fault, and the end of the first, are named in the same way.
 
-The twins run in a thread of their own, a second of samples at a time. A verdict is given `DELAY` after that second. So a live
-node and a replay give it with the same sample.
+The twins take a second of samples at a time, in a thread of a replay, and in a process beside a live node: the samples of the
+rig must not wait for their Python code. A verdict is given `DELAY` after that second, so both give it with the same sample.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
+from functools import cached_property
 from statistics import NormalDist
 from typing import Any, NamedTuple, Protocol
 
@@ -23,6 +24,7 @@ import numpy as np
 from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
+from ..system.child_call import ChildCall
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
 from .causes import (
     MEMORY,
@@ -86,20 +88,10 @@ class _Second(NamedTuple):
 
 
 class FaultTwins:
-    """Twins of all fault hypotheses.
+    """Samples of each second for a `FaultSearch`, and its alarms when they are due.
 
-    Parameters
-    ----------
-    scene : Scene
-        Boom with its load.
-    make : callable
-        Hypothesis -> its twin.
-    settings : Settings
-        With the posterior probability required to name a cause, and the errors of the scene.
-    is_live : bool
-        True if the caller must not wait. On a busy processor verdicts then come later than `DELAY`.
-    reads : StrokeReading
-        Quantity that drives the model.
+    `is_live`: the search runs in another process, and the caller must not wait. On a busy processor verdicts then come later
+    than `DELAY`. Other parameters: see `FaultSearch`.
     """
 
     def __init__(
@@ -110,21 +102,22 @@ class FaultTwins:
         is_live: bool = False,
         reads: StrokeReading = StrokeReading.LENGTH,
     ) -> None:
-        self._reads = reads
-        self._scene, self._make, self._settings, self._is_live = scene, make, settings, is_live
+        self._given, self._is_live = (scene, make, settings, reads), is_live
         self._lasting: dict[str, Alarm] = {}
         self._pending: list[Any] = []
         self._second = 0  # whole seconds of the pending samples' stamps
         self._left_out: tuple[Flags, Flags] | None = None
-        self._taken: dict[tuple[int, int], int] = {}  # stamp of the newest sample taken, by stream and channels
+        self._taken: dict[tuple[int, bytes], int] = {}  # stamp of the newest sample taken, by stream and channels
         self._worker = ThreadPoolExecutor(1, "fault twins")
         self._results: deque[tuple[int, Future[list[Alarm]]]] = deque()
-        self._recent: deque[_Second] = deque(maxlen=MEMORY)
-        self._change: Change | None = None
-        self._creep = CreepMonitor(scene)
-        self._named: dict[Fault, Alarm] = {}
-        self._zeros_before: dict[str, tuple[int, float]] = {}  # place among a sensor's zeros, and its value before the onset
-        self._begin()
+
+    def begin(self) -> None:
+        """Begin to make the twins."""
+        self._worker.submit(lambda: self._search)
+
+    @cached_property
+    def _search(self) -> Callable[[_Second], list[Alarm]]:
+        return ChildCall(FaultSearch, *self._given) if self._is_live else FaultSearch(*self._given)
 
     # -- samples in
 
@@ -138,24 +131,26 @@ class FaultTwins:
             self._second = second
 
     def take(self, block: Any) -> None:
-        """Take samples of one second, in the order in which the twin takes them."""
-        self._pending.append(self._thinned(block))
+        """Take samples of one second, in the order in which the twin takes them; keep those that `wants` accepts."""
+        streams, stamps, values = block.streams, block.stamps, block.values
+        keys, chosen = zip(streams.tolist(), map(_channels, np.isfinite(values)), strict=True), list[int]()
+        for row, (key, stamp) in enumerate(zip(keys, stamps.tolist(), strict=True)):
+            if self._is_spaced(key, stamp):
+                self._taken[key] = stamp
+                chosen.append(row)
+        self._pending.append(block._replace(streams=streams[chosen], stamps=stamps[chosen], values=values[chosen]))
+
+    def wants(self, code: int, stamp: int, values: Array) -> bool:
+        """Return True if a sample is at least `SPACING` after the last taken one of the same stream and channels."""
+        return self._is_spaced((code, _channels(np.isfinite(values))), stamp)
+
+    def _is_spaced(self, key: tuple[int, bytes], stamp: int) -> bool:
+        return not 0 <= stamp - self._taken.get(key, stamp - SPACING) < SPACING
 
     def change(self, change: Change) -> None:
         """Take a change before the samples that follow."""
         self._close()
         self._hand_over(_Second(change.stamp, change=change))
-
-    def _thinned(self, block: Any) -> Any:
-        """Return the samples of a block at least `SPACING` after the last taken one of the same channels."""
-        streams, stamps, values = block.streams, block.stamps, block.values
-        channels = np.isfinite(values) @ (1 << np.arange(values.shape[1]))
-        chosen = list[int]()
-        for row, (code, stamp, there) in enumerate(zip(streams.tolist(), stamps.tolist(), channels.tolist(), strict=True)):
-            if not 0 <= stamp - self._taken.get((code, there), stamp - SPACING) < SPACING:
-                self._taken[code, there] = stamp
-                chosen.append(row)
-        return block._replace(streams=streams[chosen], stamps=stamps[chosen], values=values[chosen])
 
     def _close(self) -> None:
         """Hand the pending samples to the twins."""
@@ -167,7 +162,7 @@ class FaultTwins:
         self._pending = []
 
     def _hand_over(self, second: _Second) -> None:
-        self._results.append((second.stamp + SECOND + DELAY, self._worker.submit(self._follow, second)))
+        self._results.append((second.stamp + SECOND + DELAY, self._worker.submit(lambda: self._search(second))))
 
     # -- alarms out
 
@@ -188,7 +183,36 @@ class FaultTwins:
         """Alarms that last."""
         return list(self._lasting.values())
 
-    # -- in the worker's thread
+
+class FaultSearch:
+    """Twins of all fault hypotheses: a call with a second of samples, or a change, returns the alarms that begin or end.
+
+    Parameters
+    ----------
+    scene : Scene
+        Boom with its load.
+    make : callable
+        Hypothesis -> its twin.
+    settings : Settings
+        With the posterior probability required to name a cause, and the errors of the scene.
+    reads : StrokeReading
+        Quantity that drives the model.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        make: Callable[[Hypothesis], Follower],
+        settings: Settings,
+        reads: StrokeReading = StrokeReading.LENGTH,
+    ) -> None:
+        self._scene, self._make, self._settings, self._reads = scene, make, settings, reads
+        self._recent: deque[_Second] = deque(maxlen=MEMORY)
+        self._change: Change | None = None
+        self._creep = CreepMonitor(scene)
+        self._named: dict[Fault, Alarm] = {}
+        self._zeros_before: dict[str, tuple[int, float]] = {}  # place among a sensor's zeros, and its value before the onset
+        self._begin()
 
     def _begin(self) -> None:
         """Make twins of the boom as believed, without each named fault (except ``off``), and with each other fault."""
@@ -221,7 +245,7 @@ class FaultTwins:
             twin.requests.repeat(_changed(self._change, each))
         return twin
 
-    def _follow(self, second: _Second) -> list[Alarm]:
+    def __call__(self, second: _Second) -> list[Alarm]:
         """Let all twins take a second or a change; return the alarms that begin or end."""
         if second.change is not None:
             self._recent.clear()
@@ -368,6 +392,11 @@ class FaultTwins:
         for second in self._recent:
             _feed(twin, each, second)
             yield second.stamp, twin
+
+
+def _channels(has_value: Flags) -> bytes:
+    """Return a key of the channels of a sample that have a value. Channels that its stream lacks may follow."""
+    return has_value.tobytes().rstrip(b"\0")
 
 
 def _feed(twin: Follower, each: Hypothesis, second: _Second) -> None:

@@ -192,6 +192,7 @@ def spectrum_picture(path: Path, session: str, history: History, note: str) -> N
             axes.loglog(*_curve(found.predicted[i]), color=(BLUE, ORANGE)[i], linewidth=1.8, label="predicted")
             axes.set_title(f"{quantity[0].upper()}{quantity[1:]}, {names[i]}")
             axes.set_xlabel("frequency, Hz")
+            axes.minorticks_off()
             _modes(axes, history.natural)
             legend_above(axes, 2)
         panels[0].set_ylabel("power spectral density, (m/s²)²/Hz")

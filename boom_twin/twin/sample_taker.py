@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, cast
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +83,9 @@ class SampleTaker:
         self._judged = True  # health, with the present sample
         self._fault_twins: FaultTwins | None = None
         if causes and health:
-            self._fault_twins = FaultTwins(self.scene, self._maker(), self.settings, is_live, reads)
+            sensors = {"reads": reads, "absent": self.absent, "places": self.places, "lagging": self.lagging}
+            make = partial(_follower, type(self), self.settings, self.mounts, sensors)
+            self._fault_twins = FaultTwins(self.scene, make, self.settings, is_live, reads)
         self._begin()
 
     def _begin(self) -> None:
@@ -95,17 +98,6 @@ class SampleTaker:
         self._lines = self._new_lines()
         self._zeros = SensorZeros(self._state, self._channels, self._drive)
         self._recent = ResidualBuffer(self._state.recent, self._channels)
-
-    def _maker(self) -> Callable[[Hypothesis], Follower]:
-        kind, settings = cast(Any, type(self)), self.settings
-
-        def make(each: Hypothesis) -> Follower:
-            boom = each.scene, settings.tuned(each.load(*settings.load)), self.mounts
-            sensors: Any = {"absent": self.absent, "doubted": each.doubted, "places": self.places, "lagging": self.lagging}
-            twin: Follower = kind(*boom, reads=self.reads, **sensors, is_follower=True)
-            return twin
-
-        return make
 
     def _failing(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         assert self.judge is not None
@@ -344,3 +336,10 @@ class SampleTaker:
 
     def _is_complete(self, sample: Sample) -> bool:
         return bool((np.abs(sample.values) <= LIMIT)[self._there[sample.stream]].all())
+
+
+def _follower(kind: Any, settings: Settings, mounts: tuple[Mount | None, ...], sensors: Any, each: Hypothesis) -> Follower:
+    """Return the fault twin of a hypothesis, of class `kind`."""
+    boom = each.scene, settings.tuned(each.load(*settings.load)), mounts
+    twin: Follower = kind(*boom, **sensors, doubted=each.doubted, is_follower=True)
+    return twin

@@ -169,6 +169,8 @@ class Twin(SampleTaker):
         other.update(Sample(drive, 7_000_000, driving))  # a late one is looked up among those before
         if self.judge is not None:
             warm_up()
+        if self._fault_twins is not None:
+            self._fault_twins.begin()
 
     def update(self, sample: Sample | Mapping[str, Any], judged: bool = True, stamp_ns: int | None = None) -> Report:
         """Take one sample; see `Report` for what comes back. Whatever the rig measures, it never raises.
@@ -206,7 +208,7 @@ class Twin(SampleTaker):
         if reason != DONE:
             return self._take_irregular(sample, reason).report(self.plan.joints)
         report = self._compiled.report(sample.stamp, judged)
-        if self._fault_twins is not None:
+        if self._fault_twins is not None and self._fault_twins.wants(CODES[sample.stream], sample.stamp, sample.values):
             self._fault_twins.take(block_of([sample], self.plan.joints))
         return report
 

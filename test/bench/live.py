@@ -2,8 +2,8 @@
 
 Run ``python test/bench/live.py`` on an idle machine: real processes and DDS, loopback only; medians of three runs. A
 source sends strokes and angles, stamped with the time of sending; a listener takes everything that is published. The node
-comes first, then the echo, which is rclpy as its tutorials use it: the node's topics, so seven stamped messages for every
-stroke sample, one for every other sample, nothing computed; once on rclpy's default executor, once on the events executor.
+comes first, then the echo, which is rclpy as its tutorials use it: the node's topics, so ten stamped messages for every stroke
+sample, one for angles, two for an IMU, nothing computed; once on rclpy's default executor, once on the events executor.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Echo(Node):
             message.position = message.velocity = message.effort = array("d", [0.0] * 4)
         self.create_subscription(JointState, "cylinder_strokes", lambda msg: self._answer(msg, list(OUT)), SENSOR)
         self.create_subscription(JointState, "joint_angles", lambda msg: self._answer(msg, ["residuals"]), SENSOR)
-        self.create_subscription(Imu, "tip_imu", lambda msg: self._answer(msg, ["residuals"]), SENSOR)
+        self.create_subscription(Imu, "tip_imu", lambda msg: self._answer(msg, ["residuals"] * 2), SENSOR)
 
     def _answer(self, msg: Any, names: list[str]) -> None:
         for name in names:
@@ -181,15 +181,23 @@ def listen(who: str, *forget: str) -> None:
     print(json.dumps({name: [[stamp, now - stamp] for stamp, now in rows] for name, rows in found.items()}))
 
 
+def folders(process: subprocess.Popen) -> list[Path]:
+    """Folders in /proc of a process and its children."""
+    own = Path(f"/proc/{process.pid}")
+    children = " ".join(each.read_text() for each in own.glob("task/*/children"))
+    return [own, *(Path("/proc") / number for number in children.split())]
+
+
 def cpu(process: subprocess.Popen) -> float:
-    """Processor seconds so far."""
-    fields = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / TICK
+    """Processor seconds so far, with children."""
+    rows = [(each / "stat").read_text().rsplit(")", 1)[1].split() for each in folders(process)]
+    return sum(int(fields[11]) + int(fields[12]) for fields in rows) / TICK
 
 
 def memory(process: subprocess.Popen) -> float:
-    """Resident, MB."""
-    return int(Path(f"/proc/{process.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE") / 1e6
+    """Resident, MB, with children."""
+    pages = sum(int((each / "statm").read_text().split()[1]) for each in folders(process))
+    return pages * os.sysconf("SC_PAGESIZE") / 1e6
 
 
 def run(who: str, rate: float, duration: float, words: list[str], arguments: list[str]) -> dict[str, float]:
@@ -219,7 +227,7 @@ def run(who: str, rate: float, duration: float, words: list[str], arguments: lis
         finally:
             for process in (answering, listener):
                 process.kill()
-    return judge(told, heard, 2 + ("imu" in words)) | {"cpu": 100.0 * used / told["seconds"], "MB": resident}
+    return judge(told, heard, 2 + 2 * ("imu" in words)) | {"cpu": 100.0 * used / told["seconds"], "MB": resident}
 
 
 def judge(told: dict[str, Any], heard: dict[str, list[list[int]]], compared: int) -> dict[str, float]:

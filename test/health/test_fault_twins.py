@@ -65,6 +65,21 @@ def test_sample_by_sample_as_by_blocks():
     assert np.array_equal([each.tip_sigmas for each in found], [each.tip_sigmas for each in single])
 
 
+@pytest.mark.system
+def test_a_process_beside_a_live_twin_names_what_a_replay_names():
+    """A live twin whose process keeps up tells the same causes with the same samples as a replay, with equal figures."""
+    scene, told = stiffer("cylinder_2.k"), []
+    for is_live in (False, True):
+        twin, named = Twin(scene, health=True, causes=True, is_live=is_live), {}
+        for sample in session(20.0):
+            for _, verdict in twin.judge.fault_twins._results:
+                verdict.result()
+            health = twin.update(sample).health
+            named |= {each: health.stamp for each in health.alarms if each.cause and each not in named} if health else {}
+        told.append(named)
+    assert told[0] == told[1] != {}
+
+
 def test_a_fault_twin_has_the_evidence_of_a_twin_without_its_reports():
     """Reports of a fault twin are empty, and its likelihood is that of a twin with reports, bit for bit."""
     scene, samples = load_scene(), session(2.0)

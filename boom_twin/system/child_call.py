@@ -1,0 +1,79 @@
+"""Call a function in a child process, so that its Python code does not hold the interpreter's lock of this one."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+from ..errors import BoomTwinError
+from .processes import python_command
+
+LESS_URGENT = 5  # added niceness of the child
+
+
+class ChildCall:
+    """Callable that `make` returns for its arguments, made and called in a child process. Everything passed is pickled.
+
+    A call blocks its thread only. The child is killed with this object, and ends with its standard input: with this process.
+    """
+
+    def __init__(self, make: Callable[..., Callable[..., Any]], *arguments: Any) -> None:
+        command = python_command("boom_twin.system.child_call")
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        weakref.finalize(self, _end, self._process)
+        self._send((make, arguments))
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Return what the call gives; raise what it raises, or BoomTwinError if the child has ended."""
+        assert self._process.stdout is not None
+        try:
+            self._send(arguments)
+            error, found = pickle.load(self._process.stdout)
+        except (EOFError, OSError) as ended:
+            raise BoomTwinError(f"a child process ended with code {self._process.wait()}") from ended
+        if error is not None:
+            raise error
+        return found
+
+    def _send(self, found: Any) -> None:
+        assert self._process.stdin is not None
+        pickle.dump(found, self._process.stdin)
+        self._process.stdin.flush()
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.communicate()
+
+
+def _serve() -> None:
+    """Answer the calls that arrive on standard input. What is printed goes to standard error."""
+    for stop in (signal.SIGINT, signal.SIGHUP):  # sent to all processes of a terminal
+        signal.signal(stop, signal.SIG_IGN)
+    os.nice(LESS_URGENT)
+    calls, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    make, arguments = pickle.load(calls)
+    call = make(*arguments)
+    while True:
+        try:
+            arguments = pickle.load(calls)
+        except EOFError:
+            return
+        error, found = None, None
+        try:
+            found = call(*arguments)
+        except Exception as raised:
+            error = raised
+        pickle.dump((error, found), answers)
+        answers.flush()
+
+
+if __name__ == "__main__":
+    _serve()

@@ -1,0 +1,29 @@
+"""Calls that a child process carries out."""
+
+import os
+from functools import partial
+from operator import truediv
+
+import pytest
+
+from boom_twin import BoomTwinError
+from boom_twin.system.child_call import ChildCall
+
+pytestmark = pytest.mark.system
+
+
+def test_a_call_gives_what_its_function_gives():
+    """Results and exceptions come back; what the function prints does not mix with them."""
+    divide, write = ChildCall(partial, truediv, 6.0), ChildCall(partial, print)
+    assert divide(4.0) == 1.5
+    with pytest.raises(ZeroDivisionError):
+        divide(0.0)
+    assert divide(3.0) == 2.0
+    assert write("printed") is None and write("again") is None
+
+
+def test_a_child_that_ends_is_an_error():
+    leave = ChildCall(partial, os._exit)
+    for _ in range(2):
+        with pytest.raises(BoomTwinError, match="a child process ended with code 3"):
+            leave(3)
