@@ -177,16 +177,16 @@ def alarms_of(row: dict[str, Any], block: SampleBlock, causes: bool) -> list[lis
 def judged(row: dict[str, Any]) -> tuple[list[dict[str, Any]], list[list[Any]]]:
     """Return what is right of each fault of a row, or of a healthy session, and the false alarms.
 
-    An alarm is one of a fault if it names it, or names nothing without --causes. It is false before the fault. A fault of the
-    boom or a lag is in time within 20 s of the next begin or end of a move, one of a sensor within 10 s.
+    An alarm tells of a fault if it names it; without --causes, if it names nothing, too. It is false if it names another thing,
+    or comes before the faults. A fault of the boom or a lag is told in time within 20 s of the next begin or end of a move, one
+    of a sensor within 10 s.
     """
     found, false = [], list(row["alarms"])
     for text in row["faults"]:
         fault, cause = fault_of(text), text.partition(":")[0]
         names = {cause, cause.replace("cylinder_", "joint_")} if cause.endswith("sensor") else {cause}
-        names |= set() if row["causes"] else {None}
-        own = [each for each in row["alarms"] if each[2] in names and each[5] >= fault.onset]
-        false = [each for each in false if each not in own]
+        begun = [each for each in row["alarms"] if each[2] in (*names, None) and each[5] >= fault.onset]
+        false, own = [each for each in false if each not in begun], [each for each in begun if each[2] or not row["causes"]]
         full, shows_in_moves = fault.onset + fault.ramp, fault.is_physical or fault.kind == "late"
         due = min([each for each in row["edges"] if each >= full], default=full) + 20.0 if shows_in_moves else full + 10.0
         found.append({
