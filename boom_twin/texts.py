@@ -46,6 +46,8 @@ SENTENCES = {
     "spikes": Sentence("{thing} gives single readings far from their neighbours", "Check its cable and plug"),
     "jump": Sentence("{thing} jumped at once, as no boom can", "Check its mount; if it stays, set its zero"),
     "dropout": Sentence("{thing} gives no readings", "Check its cable, supply and driver"),
+    "dropout joint_angles": Sentence("no readings of {thing} are used", "Check that one driver sends them, and its cable"),
+    "dropout cylinder_forces": Sentence("no readings of {thing} are used", "Check that one driver sends them, and its cable"),
     "intermittent": Sentence("{thing} fails again and again", "Check its cable and plug"),
     "range": Sentence("{thing} reads what it cannot", "Check its unit, sign and zero in the mapping"),
     "wiring": Sentence(

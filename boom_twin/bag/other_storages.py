@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from bisect import bisect_right
 from bz2 import BZ2Decompressor
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import numpy as np
 from lz4.frame import LZ4FrameDecompressor
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Reader, ReaderError
@@ -21,11 +23,13 @@ from ..errors import BagError
 from ..messages.type_store import jazzy, other_than_jazzy
 from ..system.received_files import holds_file, open_received
 from .mcap_records import MOST_HELD
-from .session_file import CDR, PARSE_ERRORS, SessionFile, channel_of, schema_of
+from .session_file import CDR, PARSE_ERRORS, PIECE, LogClock, SessionFile, channel_of, schema_of
 
 MAGIC = b"SQLite format 3\0"
 BESIDE = ("-wal", "-journal")  # suffixes of the files in which sqlite3 keeps data that are not in the database yet
-_MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
+_MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY "
+_TIMES = "SELECT IFNULL(CAST(topic_id AS INTEGER), 0), MAX(IFNULL(CAST(timestamp AS INTEGER), 0), 0) FROM messages ORDER BY id"
+_TOGETHER = 100_000  # messages whose times are read at once
 _REMEDY = "The file is damaged or no rosbag2 storage: try `sqlite3 FILE .recover` on a copy, or another copy of the session."
 
 
@@ -33,15 +37,30 @@ _REMEDY = "The file is damaged or no rosbag2 storage: try `sqlite3 FILE .recover
 class SqliteFile(SessionFile):
     """Content of one .db3 file, which has no checksums."""
 
-    def heads(self) -> Iterator[tuple[int, int, bytes]]:
-        """Yield messages as in `SessionFile`, in the order of `blocks`.
+    def log_clock(self) -> LogClock:
+        """Return the clock as in `SessionFile`, by the order in which the messages were stored."""
+        with _database(self.path) as database:
+            rows = database.execute(_TIMES)
+            pieces = (np.array(piece).T for piece in iter(lambda: rows.fetchmany(_TOGETHER), []))
+            return LogClock.of(((channels, times.astype(np.uint64)) for channels, times in pieces), self.counts)
+
+    def heads_by(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
+        """Yield messages as in `SessionFile`: as they were stored, if the clock was set back."""
+        newest = 0
+        for row, (channel, time, data) in enumerate(self.heads("id" if clock.places else "timestamp, id")):
+            place = PIECE * (row // _TOGETHER) + row % _TOGETHER
+            newest = max(newest, time + clock.shifts[bisect_right(clock.places, place)])
+            yield channel, newest, data
+
+    def heads(self, order: str = "timestamp, id") -> Iterator[tuple[int, int, bytes]]:
+        """Yield messages as in `SessionFile`, in the order of their log times.
 
         Raise BagError if the messages have more bytes than the file: columns with a default, or generated, can give any
         number of bytes.
         """
         left = self.path.stat().st_size
         with _database(self.path) as database:
-            for channel, time, data in database.execute(_MESSAGES):
+            for channel, time, data in database.execute(_MESSAGES + order):
                 if channel not in self.channels or not isinstance(data, bytes) or not isinstance(time, int) or time < 0:
                     raise BagError(f"{self.path}: a message of topic {channel!r} at {time!r} ns is none. {_REMEDY}")
                 left -= len(data)

@@ -194,13 +194,17 @@ class SessionFile(ABC):
         """Return the clock of log times. The default is for a storage whose order is that of log times."""
         return LogClock([], [0])
 
+    def heads_by(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
+        """Yield messages as `heads` does, in the order of log times by the `clock`."""
+        return self.heads()
+
     def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
         """Yield blocks of all messages, except of the `passed` channels, in the order of log times by the `clock`.
 
-        `sources` of a block holds channel numbers. This default requires that `heads` yields messages by log time.
+        `sources` of a block holds channel numbers.
         """
         together = 2000  # messages in one block of a file that is read message by message
-        found = (each for each in self.heads() if each[0] not in passed)
+        found = (each for each in self.heads_by(clock) if each[0] not in passed)
         while group := list(islice(found, together)):
             sources, times, data = zip(*group, strict=True)
             ends = np.cumsum([len(each) for each in data])

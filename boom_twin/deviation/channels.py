@@ -181,9 +181,20 @@ def write_expected_readings(p, f, live, results, stamp, h, values, sigmas):
         else:
             values[c] = f.felt[c]
         sigmas[c] = math.sqrt(noise2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
+        note_curve(f.curves[c], values[c], h)
         if copies >= 0 and f.copies[c] >= 0:
             f.row[size + channel.zero] = 1.0
             copy_reading(p, f, copies + f.copies[c], 0.0 if channel.kind == READS_NOTHING else values[c])
+
+
+@inner
+def note_curve(curve, value, h):
+    """Take an expected reading, `h` s after the one before, into the mean square of its second derivative."""
+    rate, mean = 0.0, 0.0
+    if h > 0.0:
+        rate, mean = (value - curve[0]) / h, curve[2]
+        mean += min(h / SHAKEN_TIME, 1.0) * (((rate - curve[1]) / h) ** 2 - mean)
+    curve[0], curve[1], curve[2] = value, rate, mean
 
 
 def measurement_of(

@@ -110,16 +110,19 @@ def copy_to(f, x, covariance, at, every):
 
 @inner
 def delayed_row(p, f, c, stamp, row, rates):
-    """Write the row of late channel `c` at `stamp` (ns), and the row of its rate; return False if it was not copied."""
+    """Write the row of late channel `c` at `stamp` (ns), and the row of its rate.
+
+    Return the time (s) between the instants around it and its place between them, from 0 to 1; 0 s if it was not copied.
+    """
     width, every = copy_width(f), all_states(p)
     count = p.delayed[0] // max(width, 1)
     before, after = instant_to(f, count, stamp), instant_beyond(f, count, stamp)
     if f.copies[c] < 0 or before < 0 or after < 0:
-        return False
+        return 0.0, 0.0
     clear(row, every)
     clear(rates, every)
     span, first = 1e-9 * (f.instants[after] - f.instants[before]), copy_place(p) + f.copies[c]
     share = 1e-9 * (stamp - f.instants[before]) / span
     row[first + before * width], row[first + after * width] = 1.0 - share, share
     rates[first + before * width], rates[first + after * width] = -1.0 / span, 1.0 / span
-    return True
+    return span, share

@@ -53,15 +53,17 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         residual = residuals[c - first]
         if f.masked[c] or not math.isfinite(residual):
             continue
-        channel = p.channels[c]
+        channel, span, share = p.channels[c], 0.0, 0.0
         admit_errors(p, f, max(channel.last, lag + 1) + 1)
         if age == 0.0:
             measurement_row(p, f, c, f.row)
             f.row[zero_place(p) + channel.zero] = 1.0
             if lag >= 0:
                 rate_of_row(p, f, f.row, f.rows[2])
-        elif not delayed_row(p, f, c, stamp, f.row, f.rows[2]):
-            continue
+        else:
+            span, share = delayed_row(p, f, c, stamp, f.row, f.rows[2])
+            if span == 0.0:
+                continue
         variance = channel.noise2
         if channel.kind == READS_ACCELERATION:
             variance += INEXACT * INEXACT * f.shaking[channel.site, 0]
@@ -69,6 +71,7 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
             variance += INEXACT * INEXACT * f.shaking[channel.site, 1]
         elif channel.kind == READS_ANGLE:
             variance += SWAY_SHARE * SWAY_SHARE * f.sway2[channel.index]
+        variance += interpolation_variance(f.curves[c, 2], span, share, 1e-9 * (stamp - f.taken[stream]))
         if lag >= 0:
             variance += add_lag(p, f, lag, f.row, f.rows[2])
         take_reading(p, f, c, residual, variance)
@@ -76,10 +79,22 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
             f.apart[channel.index] += LEARN_RATIO * (residual - f.apart[channel.index])
             if f.deaf[channel.index]:
                 replace_length(p, f, c, residual)
+    f.taken[stream] = stamp
     weigh_models(f, ESTIMATE)
     mix(f, ESTIMATE, all_states(p))
     if lag >= 0:
         correct_stamps(p, f, lag)
+
+
+@inner
+def interpolation_variance(curvature2, span, share, apart):
+    """Return the variance by linear interpolation between two instants `span` (s) apart, for one of readings `apart` (s) apart.
+
+    The error is half the second derivative times the distances to both. All readings between the instants have it in common,
+    so each counts as a share of one.
+    """
+    error = 0.5 * share * (1.0 - share) * span * span
+    return curvature2 * error * error * (span / apart if 0.0 < apart < span else 1.0)
 
 
 @inner

@@ -52,10 +52,11 @@ class Filters(NamedTuple):
     apart : (n,) recent mean of what angle sensors read more than the lengths make of them, rad; 0 of sensors left out.
     lags, late : (streams,) by which stamps are late, as estimated, and by which samples arrived after their stamps at most, s.
     copies : (c,) places of late channels among the copies of one instant, -1 of others. instants : (DELAYED,) stamps of copies,
-    see `delayed`.
+    see `delayed`. taken : (streams,) stamps of the newest samples that corrected the estimate, ns. curves : (c, 3) expected
+    readings, their rates, and mean squares of their second derivatives.
     bends : (sites, 2) accelerations that the curved ways of sites need, m/s^2. ways : (n + 1, 4) those of pivots and tip,
-    rates (rad/s) and angular accelerations (rad/s^2) of the chords behind them. swing : (m,) modal forces by
-    these, inputs : (2 m,) changes of modal coordinates and rates in a step by them. sway2 : (n,) square of the largest angle by
+    rates (rad/s) and angular accelerations (rad/s^2) of the chords behind them. swing : (m,) modal forces by these,
+    inputs : (2 m,) changes of modal coordinates and rates in a step by them. sway2 : (n,) square of the largest angle by
     which an inclinometer lately erred, rad^2.
     places, weights, counts : (p, k), (p, k), (p,) columns of the transition matrix by row. variances : (s,) of its noise.
     motion : (sites, 9) predicted x, y, angle of every site, m and rad, their rates, their accelerations.
@@ -94,6 +95,8 @@ class Filters(NamedTuple):
     apart: Array
     lags: Array
     late: Array
+    taken: NDArray[np.int64]
+    curves: Array
     copies: NDArray[np.int64]
     instants: NDArray[np.int64]
     noise: SensorNoise
@@ -133,7 +136,8 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
         ways=np.zeros((n + 1, 4)), swing=np.zeros(modes), inputs=np.zeros(2 * modes),
         sway2=np.zeros(n), apart=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,
-        late=np.zeros(len(Stream)), copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
+        late=np.zeros(len(Stream)), taken=np.zeros(len(Stream), np.int64), curves=np.zeros((channels, 3)),
+        copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         places=np.zeros((own, 8 + n), np.int64), weights=np.zeros((own, 8 + n)), counts=np.zeros(own, np.int64),
         variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
         half=np.zeros((own, states)), turned=np.zeros((own, own)), mixed_x=np.zeros((3, states)),

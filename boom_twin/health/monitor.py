@@ -69,7 +69,7 @@ class HealthMonitor:
         self._ranges = sensor_ranges(scene, mounts)
         self._uncertain = UNCERTAIN * settings.variance(SENSORS[self._drive])
         self._sensors = {
-            stream: SensorMonitor(names, SENSORS[stream], stream is not self._drive, absent)
+            stream: SensorMonitor(names, stream, stream is not self._drive, absent)
             for stream, names in self._channels.items()
             if stream is not Stream.STROKES or stream is self._drive
         }

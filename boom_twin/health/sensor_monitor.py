@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from ..sensor_kinds import SensorKind
-from ..types import NANO, Alarm, Array
+from ..types import NANO, SENSORS, Alarm, Array, Stream
 from .alarms import change_text
 from .sensor_check import MEASURED, MISSTATED, NOISE_OVER, Flags, SensorFindings
 
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended
 AGAIN = 60_000_000_000  # ns between failures of one intermittent contact
 CAME_BACK = 0.3  # of a jump, by which a sensor that came back may still be off
+WHOLE = -1  # place of the whole stream behind its channels
 
 
 def noise_as_text(figures: Mapping[str, Any]) -> list[str]:
@@ -53,8 +53,8 @@ class SensorMonitor:
     ----------
     names : tuple of str
         Of its channels.
-    kind : SensorKind
-        Says which findings give an alarm.
+    stream : Stream
+        Its kind says which findings give an alarm.
     is_predicted : bool
         Whether a model says what the sensors should read.
     absent : collection of str
@@ -66,10 +66,8 @@ class SensorMonitor:
         Channels that are not to be trusted; another array once these are others.
     """
 
-    def __init__(
-        self, names: tuple[str, ...], kind: SensorKind, is_predicted: bool = True, absent: Collection[str] = ()
-    ) -> None:
-        self._names, self._sensors, self._is_predicted = names, kind, is_predicted
+    def __init__(self, names: tuple[str, ...], stream: Stream, is_predicted: bool = True, absent: Collection[str] = ()) -> None:
+        self._names, self._sensors, self._is_predicted = (*names, stream.value), SENSORS[stream], is_predicted
         self._there = np.array([name not in absent for name in names])
         self._faults: dict[tuple[int, str], _Fault] = {}
         self._onsets: dict[int, list[int]] = {}  # of failures, by channel, ns
@@ -89,7 +87,8 @@ class SensorMonitor:
     def _mask(self) -> None:
         """Mask the channels that have faults by now."""
         masked = self._none.copy()
-        masked[[channel for channel, kind in self._faults if kind != "spikes"]] = True
+        failing = [channel for channel, kind in self._faults if kind != "spikes"]
+        masked[slice(None) if WHOLE in failing else failing] = True
         self.masked = self.masked if (masked == self.masked).all() else masked
 
     def take(
@@ -115,7 +114,7 @@ class SensorMonitor:
         for kind, flags in findings.flags.items():
             if kind not in self._sensors.alarms or not flags.any():
                 continue
-            for channel in np.flatnonzero(flags & self._there).tolist():
+            for channel in self._chosen(flags & self._there, kind):
                 if kind == "jump" and self._is_wild(channel):
                     continue
                 jump = (float(findings.jumped[channel]), float(findings.level[channel])) if kind == "jump" else None
@@ -133,6 +132,12 @@ class SensorMonitor:
         well = [c for c in self._intermittent if c not in failing and end - self._onsets[c][-1] > AGAIN]
         return [*news, *(replace(self._intermittent.pop(channel), until=end) for channel in well)]
 
+    def _chosen(self, flags: Flags, kind: str) -> list[int]:
+        """Return the channels in flags of a kind; `WHOLE` if all channels fall silent together, which has one source."""
+        chosen: list[int] = np.flatnonzero(flags).tolist()
+        is_whole = kind == "dropout" and 1 < len(chosen) == self._there.sum()
+        return [WHOLE] if is_whole and all((channel, kind) not in self._faults for channel in chosen) else chosen
+
     def _back_after_start(self, end: int, newest: Array | None) -> list[Alarm]:
         """End jumps of sensors that read what they had before, with the first readings after a start from rest."""
         if not self._is_anew or newest is None:
@@ -147,7 +152,7 @@ class SensorMonitor:
 
     def _is_wild(self, channel: int) -> bool:
         """Return True if jumps mean nothing: the sensor has another fault, out of which it jumps when it recovers."""
-        return (channel, "jump") not in self._faults and any(known == channel for known, _ in self._faults)
+        return (channel, "jump") not in self._faults and any(known in (channel, WHOLE) for known, _ in self._faults)
 
     def _seen(
         self, channel: int, kind: str, start: int, end: int, jump: tuple[float, float] | None, evidence: str

@@ -149,16 +149,14 @@ def declared_costs(
 
 
 def _angle_errors(readings: Array, own: Channel, expected: Expected, j: int) -> Array:
-    """Return readings (blocks,) of an angle less the expected ones, less whole turns, rad."""
     return np.remainder(readings - expected.angles[_at_rest(own.absolute)][:, j] + math.pi, TAU) - math.pi
 
 
 def other_boom(table: Table, declared: Sequence[Channel], expected: Expected) -> tuple[float, Array]:
     """Return the cost of angles as declared at a boom with other linkages, and by what they turn its sections (blocks, n)."""
-    cost, turns, turn = OTHER_BOOM, list[Array](), np.zeros(len(table.values))
+    cost, turns, turn, units = OTHER_BOOM, list[Array](), np.zeros(len(table.values)), SENSORS[Stream.ANGLES].units
     for j, own in enumerate(declared):
-        readings = si(own, SENSORS[Stream.ANGLES].units, table.values[:, table.names.index(own.name)])
-        off = _angle_errors(readings, own, expected, j)
+        off = _angle_errors(si(own, units, table.values[:, table.names.index(own.name)]), own, expected, j)
         cost += math.log(OTHER_LINKAGE / ANGLE_ERROR) + 0.5 * (float(np.nanmean(off)) / OTHER_LINKAGE) ** 2
         turn = off + (0.0 if own.absolute else turn)
         turns.append(turn)

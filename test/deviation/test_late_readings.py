@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from default_boom import strokes_of_posture
 from deviation.test_models import transition_of
+from session_readings import samples_in
 
-from boom_twin import Settings, Stream, load_scene, statics
+from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
 from boom_twin.deviation.channels import measurement_row
 from boom_twin.deviation.delayed import begin_instant, copy_reading, delayed_row, note_lateness
 from boom_twin.deviation.kalman import correct, make_transition, transit
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.deviation.rows import length_row
 from boom_twin.deviation.states import ALL_VALVES, FED, PREDICTION, all_states
+from boom_twin.predictions import Estimate
 from boom_twin.types import Array
 
 SCENE = load_scene()
@@ -73,7 +77,7 @@ def test_late_readings_give_the_estimate_of_all_readings_in_their_order() -> Non
             copy_reading(p, f, first + f.copies[c], 0.0)
         for j, c in enumerate(late, start=N):
             if k >= LATE:
-                assert delayed_row(p, f, c, (k - LATE) * STEP, f.row, f.rows[2])
+                assert delayed_row(p, f, c, (k - LATE) * STEP, f.row, f.rows[2])[0] > 0.0
                 innovation = values[k - LATE, j] - f.row @ f.x[ALL_VALVES]
                 correct(f.x[ALL_VALVES], f.p[ALL_VALVES], f.row, gain, innovation, variances[j], all_states(p))
     sigmas = np.sqrt(covariance.diagonal())
@@ -83,3 +87,21 @@ def test_late_readings_give_the_estimate_of_all_readings_in_their_order() -> Non
     assert f.p[ALL_VALVES, :size, :size][np.ix_(known, known)] / scale == pytest.approx(
         covariance[np.ix_(known, known)] / scale, abs=1e-6
     )
+
+
+def test_readings_between_slow_strokes_err_by_the_interpolation_as_stated() -> None:
+    """Strokes at 5 Hz, angles and IMU at 200 Hz, against strokes at 200 Hz."""
+    samples = samples_in(Path(__file__).parents[2] / "bags" / "arch_session", seconds=20.0)
+    kept = {each.stamp for each in [each for each in samples if each.stream is Stream.STROKES][::40]}
+    slow = estimates([each for each in samples if each.stream is not Stream.STROKES or each.stamp in kept])
+    right = estimates(samples)
+    off = np.array([slow[stamp].tip - right[stamp].tip for stamp in slow])[:, :2]
+    stated = np.array([each.tip_covariance[[0, 3]] for each in slow.values()])
+    assert np.square(off).mean() < stated.mean()
+
+
+def estimates(samples: list[Sample]) -> dict[int, Estimate]:
+    """Estimates of a twin by stamp."""
+    twin = Twin(SCENE, Settings(gap=1.0))
+    reports = [each for sample in samples for each in twin.update(sample).all]
+    return {each.stamp: each.estimate for each in reports if each.estimate is not None}

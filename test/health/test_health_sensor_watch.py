@@ -10,7 +10,6 @@ from boom_twin import Stream
 from boom_twin.health.sensor_check import SensorCheck, SensorFindings
 from boom_twin.health.sensor_monitor import AGAIN, SETTLED, SensorMonitor
 from boom_twin.texts import alarm_text
-from boom_twin.types import SENSORS
 
 BLOCK, NAMES = 100_000_000, ("joint_1", "joint_2")
 
@@ -24,7 +23,7 @@ class Watched:
     """Takes block after block."""
 
     def __init__(self) -> None:
-        self.watch, self.block = SensorMonitor(NAMES, SENSORS[Stream.ANGLES]), 0
+        self.watch, self.block = SensorMonitor(NAMES, Stream.ANGLES), 0
 
     def take(self, found: SensorFindings, newest: np.ndarray | None = None):
         self.block += 1
@@ -50,8 +49,19 @@ def test_begins_once_lasts_and_ends():
         assert watched.watch.alarms == () and not watched.watch.masked.any()
 
 
+def test_a_stream_that_falls_silent_has_one_alarm() -> None:
+    watched, silent = Watched(), findings()._replace(flags={"dropout": np.ones(2, bool)})
+    (began,) = watched.take(silent)
+    assert (began.channel, began.kind) == ("joint_angles", "dropout") and "one driver sends them" in began.told
+    assert watched.take(silent) == [] and watched.watch.alarms == (began,) and watched.watch.masked.all()
+    assert [alarm.channel for alarm in watched.take(findings(1, "dropout"))] == ["joint_2"]
+    (ended,) = [alarm for _ in range(SETTLED // BLOCK) for alarm in watched.take(findings(1, "dropout"))]
+    assert ended.channel == "joint_angles" and watched.watch.masked.tolist() == [False, True]
+    assert [alarm.channel for alarm in watched.take(silent)] == ["joint_1"]  # one sensor had failed before by itself
+
+
 def test_nothing_is_found_of_a_sensor_that_is_not_there():
-    watch = SensorMonitor(NAMES, SENSORS[Stream.ANGLES], absent={NAMES[1]})
+    watch = SensorMonitor(NAMES, Stream.ANGLES, absent={NAMES[1]})
     assert watch.take(findings(1, "dropout"), 0, BLOCK) == [] and not watch.masked.any()
 
 

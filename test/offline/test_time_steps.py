@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from command import main
 from default_boom import joint_angles_of_strokes, strokes_of_posture
+from gate_sessions import write as write_by_rosbags
 from mcap.writer import IndexType, Writer
 from recordings import MessageWriter, read, scan, sensor_message
 from ros_messages import jazzy, load_topics, stamp_of
+from rosbags.rosbag2 import StoragePlugin
 
 from boom_twin import Sample, Stream, Twin, load_scene
 
@@ -112,6 +114,18 @@ def test_messages_are_in_file_order_where_the_clock_was_set_back(tmp_path: Path,
     found = samples(rows=ROWS // 2)
     logs = [sample.stamp + row % 3 * 1000 - step * (row >= 1201) for row, sample in enumerate(found)]
     assert order_of(recorded(tmp_path / "bag.mcap", found, logs, **options)) == named(found)
+
+
+def test_a_database_is_in_the_order_in_which_its_messages_were_stored(tmp_path: Path) -> None:
+    found = samples(rows=ROWS // 2)
+    logs = [sample.stamp - 3 * SECOND * (row >= 1201) for row, sample in enumerate(found)]
+    topics = [load_topics().inputs[sample.stream] for sample in found]
+    data = [
+        bytes(jazzy().serialize_cdr(sensor_message(sample), topic.type)) for sample, topic in zip(found, topics, strict=True)
+    ]
+    rows = zip([topic.absolute for topic in topics], logs, data, strict=True)
+    write_by_rosbags(tmp_path / "two", {topic.absolute: topic.type for topic in topics}, rows, StoragePlugin.SQLITE3)
+    assert order_of(tmp_path / "two") == named(found)
 
 
 def test_files_follow_one_in_which_the_clock_was_set_back(tmp_path: Path) -> None:
