@@ -306,10 +306,6 @@ class BoomPredictor:
         """How often the estimate was restarted because the lengths contradicted it."""
         return int(self.filters.status[RESTARTS])
 
-    def restart_estimate(self) -> None:
-        """Restart the estimate from the prediction with the next step."""
-        self.filters.status[FED] = 0
-
     @property
     def tip_loads(self) -> tuple[Array, Array]:
         """Force at the tip that the model does not know, predicted and estimated (N), and variances, shape (2, 2) each."""

@@ -61,9 +61,6 @@ class Follower(Protocol):
     def restarts(self) -> int:
         """How often the estimate was restarted because the lengths contradicted it."""
 
-    def restart_estimate(self) -> None:
-        """Restart the estimate from the prediction with the next step."""
-
     @property
     def requests(self) -> Any:
         """Requested changes that wait for the next stroke sample."""
@@ -261,18 +258,13 @@ class FaultSearch:
         restarts = self._twins[0].restarts
         for each, twin in zip(self._hypotheses, self._twins, strict=True):
             _feed(twin, each, second)
-        if self._twins[0].restarts > restarts:
-            self._settle()
+        if (
+            self._twins[0].restarts > restarts
+        ):  # it has forgotten zeros and load, so any other would gain by what it still knows
+            self._recent.clear()
+            self._begin()
+            return leaks
         return [*leaks, *self._decided(second.stamp)]
-
-    def _settle(self) -> None:
-        """Restart the estimates of all twins, as that of the boom as believed; leave out seconds until they have settled.
-
-        A restarted filter has forgotten zeros and load. Against it, any hypothesis would gain.
-        """
-        self._age = 0
-        for twin in self._twins:
-            twin.restart_estimate()
 
     def _decided(self, stamp: int) -> list[Alarm]:
         """Return the alarms of named faults that begin or end with the evidence of a second."""

@@ -92,10 +92,6 @@ class Twin(SampleTaker):
         """How often the estimate was restarted because the lengths contradicted it."""
         return self._boom.restarts
 
-    def restart_estimate(self) -> None:
-        """Restart the estimate from the prediction with the next step."""
-        self._boom.restart_estimate()
-
     @property
     def evidence(self) -> float:
         """Log likelihood of all readings, up to a constant that depends on the samples alone."""

@@ -17,7 +17,7 @@ from boom_twin import Sample, Scene, Settings, Stream, Twin, UsageError, load_sc
 from boom_twin.analysis.bending_stress import stations
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.deviation.states import PREDICTION, drive_place
-from boom_twin.deviation.step import move_sites, place_live
+from boom_twin.deviation.step import move_sites, place_live, write_ways
 from boom_twin.scene.kinematics import gravity_in_base
 from boom_twin.twin.blocks import CODES
 from boom_twin.types import Array, Place, Residuals
@@ -66,6 +66,7 @@ def test_rest_and_a_turn_about_one_joint_read_as_their_closed_form(tmp_path: Pat
         f.mean[PREDICTION, drive + 1] = stroke_rate
         f.mean[PREDICTION, drive + 2] = -p.curvature[0] * stroke_rate**2 / p.slope[0]  # at which the joint turns evenly
         place_live(boom.plan.tables, boom.compiled.anchor, boom.live, boom.compiled.work, p, f)
+        write_ways(boom.live, boom.compiled.work, p, f)
         move_sites(boom.plan.tables, boom.live, p, f, 0.0, gravity)
         along, across = G * math.sin(angle) - at * rate**2, G * math.cos(angle)
         c, s = math.cos(turned), math.sin(turned)
