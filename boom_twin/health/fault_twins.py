@@ -112,6 +112,16 @@ class FaultTwins:
         """Begin to make the twins."""
         self._worker.submit(lambda: self._search)
 
+    def close(self) -> None:
+        """End the process of a live node, also while it works."""
+        self._end_process()
+        self._worker.shutdown(cancel_futures=True)
+        self._end_process()  # one that was started meanwhile
+
+    def _end_process(self) -> None:
+        if isinstance(search := vars(self).get("_search"), ChildCall):
+            search.close()
+
     @cached_property
     def _search(self) -> Callable[[_Second], list[Alarm]]:
         return ChildCall(FaultSearch, *self._given) if self._is_live else FaultSearch(*self._given)

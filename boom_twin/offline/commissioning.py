@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..bag.reader import Session, read, scan
+from ..bag.reader import Session, read_blocks, scan
 from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import SessionScene, kept, mapping_of, scene_of, settings_of, strokes_of
 from ..config.yaml_text import plain, read_plain
@@ -25,7 +25,7 @@ from ..twin.twin import Twin
 from ..types import SENSORS, Array, Place, Stream, StrokeReading
 from ..wiring.check import STROKES_ALONE, Checked, Verdict, check, finding
 from ..wiring.readings import Channel, Lag, RestModel, Series, Window, is_checked, lag_of
-from .session_samples import SessionSamples
+from .session_samples import SessionSamples, decoded
 
 LOOK = 60.0  # s of a session that `wiring_of` reads
 AXES = "x", "y", "z"
@@ -206,10 +206,11 @@ def readings_of(session: Session, topics: Topics, joints: int, window: TimeWindo
     heard = {name: streams for name, streams in topics.heard.items() if (topic := session.find(name)) and topic.count}
     types = {name: topics.inputs[streams[0]].type for name, streams in heard.items()}
     columns: dict[tuple[Stream, str], tuple[list[int], list[float]]] = defaultdict(lambda: ([], []))
-    for name, _, message in read(session, types, window):
-        stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-        for stream in filter(is_checked, heard[name]):
-            delay = topics.delay(stream)
+    blocks = read_blocks(session, types, window)
+    streams = [heard[source.name] for source in blocks.sources]
+    checked = [[(stream, topics.delay(stream)) for stream in group if is_checked(stream)] for group in streams]
+    for source, stamp, message in decoded(blocks, streams):
+        for stream, delay in checked[source]:
             for key, value in _values(message, stream):
                 stamps, values = columns[stream, key]
                 stamps.append(stamp - delay)

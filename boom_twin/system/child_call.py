@@ -9,6 +9,7 @@ import subprocess
 import sys
 import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from ..errors import BoomTwinError
@@ -20,13 +21,14 @@ LESS_URGENT = 5  # added niceness of the child
 class ChildCall:
     """Callable that `make` returns for its arguments, made and called in a child process. Everything passed is pickled.
 
-    A call blocks its thread only. The child is killed with this object, and ends with its standard input: with this process.
+    A call blocks its thread only. `close` kills the child, as the end of this object does. It also ends with its standard
+    input: with this process.
     """
 
     def __init__(self, make: Callable[..., Callable[..., Any]], *arguments: Any) -> None:
         command = python_command("boom_twin.system.child_call")
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        weakref.finalize(self, _end, self._process)
+        self.close = weakref.finalize(self, _end, self._process)
         self._send((make, arguments))
 
     def __call__(self, *arguments: Any) -> Any:
@@ -35,7 +37,7 @@ class ChildCall:
         try:
             self._send(arguments)
             error, found = pickle.load(self._process.stdout)
-        except (EOFError, OSError) as ended:
+        except (EOFError, OSError, ValueError) as ended:  # ValueError: its pipes are closed
             raise BoomTwinError(f"a child process ended with code {self._process.wait()}") from ended
         if error is not None:
             raise error
@@ -61,18 +63,15 @@ def _serve() -> None:
     os.dup2(2, 1)
     make, arguments = pickle.load(calls)
     call = make(*arguments)
-    while True:
-        try:
-            arguments = pickle.load(calls)
-        except EOFError:
-            return
-        error, found = None, None
-        try:
-            found = call(*arguments)
-        except Exception as raised:
-            error = raised
-        pickle.dump((error, found), answers)
-        answers.flush()
+    with suppress(EOFError, BrokenPipeError):
+        while True:
+            arguments, error, found = pickle.load(calls), None, None
+            try:
+                found = call(*arguments)
+            except Exception as raised:
+                error = raised
+            pickle.dump((error, found), answers)
+            answers.flush()
 
 
 if __name__ == "__main__":

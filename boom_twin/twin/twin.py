@@ -46,7 +46,7 @@ class Twin(SampleTaker):
     causes : bool
         With `health`, causes of faults are named, see `boom_twin.health.fault_twins`.
     is_live : bool
-        True in a live node: `update` does not wait for the fault twins.
+        True in a live node: the fault twins run in a process of their own, and `update` does not wait for them.
     places : mapping of str to Place, optional
         Of sensors that have one, such as ``imu_2``. The tip IMU is at the tip if it is not among them.
     lagging : collection of Stream
@@ -167,6 +167,11 @@ class Twin(SampleTaker):
             warm_up()
         if self._fault_twins is not None:
             self._fault_twins.begin()
+
+    def close(self) -> None:
+        """End the process of a live twin that names causes; no sample may follow."""
+        if self._fault_twins is not None:
+            self._fault_twins.close()
 
     def update(self, sample: Sample | Mapping[str, Any], judged: bool = True, stamp_ns: int | None = None) -> Report:
         """Take one sample; see `Report` for what comes back. Whatever the rig measures, it never raises.

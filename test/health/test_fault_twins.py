@@ -76,6 +76,7 @@ def test_a_process_beside_a_live_twin_names_what_a_replay_names():
                 verdict.result()
             health = twin.update(sample).health
             named |= {each: health.stamp for each in health.alarms if each.cause and each not in named} if health else {}
+        twin.close()
         told.append(named)
     assert told[0] == told[1] != {}
 

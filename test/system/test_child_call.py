@@ -1,8 +1,10 @@
 """Calls that a child process carries out."""
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from operator import truediv
+from time import sleep
 
 import pytest
 
@@ -27,3 +29,15 @@ def test_a_child_that_ends_is_an_error():
     for _ in range(2):
         with pytest.raises(BoomTwinError, match="a child process ended with code 3"):
             leave(3)
+
+
+def test_closing_ends_a_child_that_works():
+    """A call that lasts ends with an error when another thread closes the child; later calls are errors too."""
+    wait = ChildCall(partial, sleep)
+    with ThreadPoolExecutor(1) as worker:
+        call = worker.submit(wait, 1000.0)
+        wait.close()
+        with pytest.raises(BoomTwinError, match="ended with code -9"):
+            call.result(60.0)
+    with pytest.raises(BoomTwinError, match="ended with code -9"):
+        wait(0.0)

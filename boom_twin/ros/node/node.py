@@ -248,6 +248,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self._making.abandon()
         if self._twin is not None:
             self._twin_services.close()
+            self._twin.close()
         self._twin = None
         if self._page is not None:
             self._page.close()
