@@ -24,7 +24,7 @@ import numpy as np
 from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
-from ..system.child_call import ChildCall
+from ..system.child_call import ChildCall, ChildEndedError
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
 from .causes import (
     MEMORY,
@@ -169,7 +169,15 @@ class FaultTwins:
         self._pending = []
 
     def _hand_over(self, second: _Second) -> None:
-        self._results.append((second.stamp + SECOND + DELAY, self._worker.submit(lambda: self._search(second))))
+        self._results.append((second.stamp + SECOND + DELAY, self._worker.submit(self._followed, second)))
+
+    def _followed(self, second: _Second) -> list[Alarm]:
+        """Let the search follow a second; begin another one if its process has been ended, such as for want of memory."""
+        try:
+            return self._search(second)
+        except ChildEndedError:
+            vars(self).pop("_search", None)
+            return []
 
     # -- alarms out
 

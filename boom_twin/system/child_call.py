@@ -18,6 +18,10 @@ from .processes import python_command
 LESS_URGENT = 5  # added niceness of the child
 
 
+class ChildEndedError(BoomTwinError):
+    """A child process has ended."""
+
+
 class ChildCall:
     """Callable that `make` returns for its arguments, made and called in a child process. Everything passed is pickled.
 
@@ -32,13 +36,13 @@ class ChildCall:
         self._send((make, arguments))
 
     def __call__(self, *arguments: Any) -> Any:
-        """Return what the call gives; raise what it raises, or BoomTwinError if the child has ended."""
+        """Return what the call gives; raise what it raises, or ChildEndedError."""
         assert self._process.stdout is not None
         try:
             self._send(arguments)
             error, found = pickle.load(self._process.stdout)
         except (EOFError, OSError, ValueError) as ended:  # ValueError: its pipes are closed
-            raise BoomTwinError(f"a child process ended with code {self._process.wait()}") from ended
+            raise ChildEndedError(f"a child process ended with code {self._process.wait()}") from ended
         if error is not None:
             raise error
         return found

@@ -81,6 +81,21 @@ def test_a_process_beside_a_live_twin_names_what_a_replay_names():
     assert told[0] == told[1] != {}
 
 
+@pytest.mark.system
+def test_a_live_twin_goes_on_with_other_fault_twins_when_their_process_is_killed():
+    twin = Twin(stiffer("cylinder_2.k"), health=True, causes=True, is_live=True)
+    named, fault_twins = set(), twin.judge.fault_twins
+    for k, sample in enumerate(session(25.0)):
+        for _, verdict in fault_twins._results:
+            verdict.result()
+        if k == 300:
+            fault_twins._search.close()
+        health = twin.update(sample).health
+        named |= {each.cause for each in health.alarms} if health else set()
+    twin.close()
+    assert "cylinder_2.k" in named
+
+
 def test_a_fault_twin_has_the_evidence_of_a_twin_without_its_reports():
     """Reports of a fault twin are empty, and its likelihood is that of a twin with reports, bit for bit."""
     scene, samples = load_scene(), session(2.0)
