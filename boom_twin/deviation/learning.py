@@ -90,6 +90,9 @@ def learn_load(p, f, h):
 
 @inner
 def learnt(f, before, shown, h):
-    """Return a variance (N^2) after a step of its first-order filter towards what is shown."""
+    """Return a variance (N^2) after a step of its first-order filter towards what is shown.
+
+    It stays below that of a load that has just come. A larger load is that, not a usual one.
+    """
     found = before + min(h / LEARN_LOAD, 1.0) * (min(shown, SURPRISE * before) - before)
-    return max(found, f.noise.least_load * f.noise.least_load)
+    return min(max(found, f.noise.least_load * f.noise.least_load), f.noise.burst_load * f.noise.burst_load)

@@ -9,6 +9,7 @@ from scipy.linalg import expm
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
 from boom_twin.deviation.kalman import DRIVE_TIME, FAST, SLOW, correct, make_transition, transit
+from boom_twin.deviation.learning import learnt
 from boom_twin.deviation.mixture import CLOSES, COMES, OPENS, STAYS, first_model, interact, mix
 from boom_twin.deviation.posture import Posture
 from boom_twin.deviation.predictor import BoomPredictor
@@ -125,6 +126,12 @@ def test_probabilities_of_models_are_those_of_a_markov_chain(mixture: int, boom:
     assert f.chances[first : first + 3] == pytest.approx(before @ expm(h * rates), abs=2e-6)
     assert f.chances[first : first + 3].sum() == pytest.approx(1.0)
     boom.start(REST.lengths)
+
+
+def test_a_usual_load_is_learnt_up_to_one_that_has_just_come(boom: BoomPredictor) -> None:
+    f, most = boom.filters, boom.filters.noise.burst_load**2
+    assert 0.5 * most < learnt.py_func(f, 0.5 * most, 4.0 * most, 0.1) < most
+    assert learnt.py_func(f, most, 4.0 * most, 0.1) == most
 
 
 def test_length_row_is_the_compression_of_the_oil(boom: BoomPredictor) -> None:
