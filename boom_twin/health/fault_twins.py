@@ -339,13 +339,15 @@ class FaultSearch:
         """Return a fault of the most likely size, its standard deviation, and its most likely onset, not before `onset` (ns).
 
         Twins of larger and smaller sizes follow the recent seconds until the likelihood falls on both sides. None if the
-        size is not surely larger than the largest that a healthy boom seems to have.
+        size is not surely larger than the largest that a healthy boom seems to have, or a force's below the set deviation.
         """
         odds = self._settings.name_odds
         sure = math.log(odds / (1.0 - odds))
         if fault.kind == "off":
             changed, spread = self._change_of_zero(fault, onset)
-            return (changed, spread, onset) if 0.5 * (changed.size / spread) ** 2 > sure else None
+            least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
+            is_found = 0.5 * (changed.size / spread) ** 2 > sure and abs(changed.size) >= least
+            return (changed, spread, onset) if is_found else None
         usual = usual_size(self._scene, fault, self._settings.scene_error)
         least = NormalDist().inv_cdf(0.5 + 0.5 * odds) * usual
         healthy = self._course(fault._replace(size=least), onset)

@@ -166,6 +166,21 @@ def test_a_cause_that_helps_at_any_size_is_not_named():
     assert taken(twins, 40) == []
 
 
+@pytest.mark.parametrize(("change", "named"), [(4e3, []), (6e3, ["cylinder_force_2.sensor"])])
+def test_a_force_is_named_above_the_deviation_that_is_an_alarm(change, named):
+    """Its zero changes in second 20, known to 100 N; `force_deviation` is 5 kN."""
+
+    class Doubting(Follower):
+        def zeros(self, channels):
+            """Return the zero, and its variance."""
+            return np.array([change * (self.evidence > 0.0)]), np.array([100.0**2])
+
+    def made(each):
+        return Doubting(lambda second: 30.0 * ("cylinder_force_2" in each.doubted and second >= 20))
+
+    assert [alarm.cause for alarm in taken(FaultTwins(load_scene(), made, SETTINGS), 40)] == named
+
+
 def test_a_boom_as_believed_that_had_to_restart_is_no_evidence():
     """In second 20 its estimate forgets zeros and load. Each twin that has not would gain by what it still knows."""
 
