@@ -32,7 +32,7 @@ class ChildCall:
     def __init__(self, make: Callable[..., Callable[..., Any]], *arguments: Any) -> None:
         command = python_command("boom_twin.system.child_call")
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        self.close = weakref.finalize(self, _end, self._process)
+        self.close = weakref.finalize(self, _end, self._process, os.getpid())
         self._send((make, arguments))
 
     def __call__(self, *arguments: Any) -> Any:
@@ -53,9 +53,16 @@ class ChildCall:
         self._process.stdin.flush()
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _end(process: subprocess.Popen[bytes], owner: int) -> None:
+    """End a child of the process `owner`; a fork of that has a copy of the object, and leaves the child alone."""
+    if os.getpid() != owner:
+        return
     process.kill()
-    process.communicate()
+    process.wait()
+    for pipe in (process.stdin, process.stdout):
+        assert pipe is not None
+        with suppress(OSError):  # what it holds for a child that is gone
+            pipe.close()
 
 
 def _serve() -> None:

@@ -7,6 +7,7 @@ from operator import truediv
 from time import sleep
 
 import pytest
+from eventually import eventually
 
 from boom_twin import BoomTwinError
 from boom_twin.system.child_call import ChildCall
@@ -41,3 +42,17 @@ def test_closing_ends_a_child_that_works():
             call.result(60.0)
     with pytest.raises(BoomTwinError, match="ended with code -9"):
         wait(0.0)
+
+
+def test_a_fork_leaves_the_child_alone():
+    """A fork of this process has a copy of the object, whose end there neither waits nor ends the child."""
+    divide = ChildCall(partial, truediv, 6.0)
+    if (fork := os.fork()) == 0:
+        divide.close()
+        os._exit(0)
+
+    def ended():
+        assert os.waitpid(fork, os.WNOHANG)[0] == fork
+
+    eventually(ended, 60.0)
+    assert divide(4.0) == 1.5
