@@ -20,7 +20,8 @@ from ..types import NO_PLACES, SECOND, SENSORS, Array, Mount, Place, Stream, Str
 from .estimate_row import ACCELERATION_COVARIANCE, FORCE_VARIANCE, TIP_COVARIANCE, VARIANCES, WIDTH
 from .predictor import BoomPredictor
 from .sensors import take_sensor
-from .step import step_lengths, write_tip_estimate
+from .step import step_lengths
+from .tip_estimate import write_tip_estimate
 
 SETTLED = 20.0  # s
 POINT_RATE = 1.0  # Hz, of a total station

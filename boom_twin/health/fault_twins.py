@@ -1,8 +1,4 @@
-"""Fault twins: one twin for each fault hypothesis, and one of the boom as believed, on the same samples.
-
-The filter of a twin gives the log likelihood of all readings (`BoomPredictor.evidence`). A fault twin has a scene with one
-fault, or lets a sensor's zero drift. `causes` decides by the gains in likelihood. A named fault becomes part of the boom as
-believed. So a second fault, and the end of the first, are named in the same way.
+"""Seconds of samples for the fault twins, and the alarms of these when they are due.
 
 The twins take a second of samples at a time, in a thread of a replay, and in a process beside a live node: the samples of the
 rig must not wait for their Python code. A verdict is given `DELAY` after that second, so both give it with the same sample.
@@ -10,78 +6,24 @@ rig must not wait for their Python code. A verdict is given `DELAY` after that s
 
 from __future__ import annotations
 
-import math
 from collections import deque
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import replace
 from functools import cached_property
-from statistics import NormalDist
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 import numpy as np
 
 from ..config.settings import Settings
-from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..system.child_call import ChildCall, ChildEndedError
-from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
-from .causes import (
-    MEMORY,
-    TEMPER,
-    Evidence,
-    Fault,
-    Hypothesis,
-    Verdict,
-    evidence_of,
-    hypothesis,
-    possible_faults,
-    usual_size,
-)
-from .creep import SPAN, CreepMonitor
+from ..types import SECOND, Alarm, Array, Change, StrokeReading
+from .causes import Hypothesis
+from .fault_search import FaultSearch, Follower, Second
 from .sensor_check import Flags
 
-RATIO = 1.4  # of successive trial sizes of a named fault
-IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
-CAME_BACK = 0.3  # remaining share of a zero's change, below which the fault has ended
 SPACING = 18_000_000  # ns, least time between samples of a stream: 50 Hz suffice for all motion of the boom
-SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
-WARM_UP = 10  # s of recent samples that new twins take first: they start at rest, and the boom may be moving
 DELAY = 2 * SECOND  # ns from the end of a second to its verdict
-
-
-class Follower(Protocol):
-    """Interface of a twin as far as fault twins need it; see `boom_twin.Twin`."""
-
-    @property
-    def evidence(self) -> float:
-        """Log likelihood of all readings."""
-
-    @property
-    def restarts(self) -> int:
-        """How often the estimate was restarted because the lengths contradicted it."""
-
-    @property
-    def requests(self) -> Any:
-        """Requested changes that wait for the next stroke sample."""
-
-    def take(self, block: Any, /) -> object:
-        """Take the samples of a block."""
-
-    def zeros(self, channels: Collection[str], /) -> tuple[Array, Array]:
-        """Estimated zeros of sensors, and their variances."""
-
-    def leave_out(self, masked: Flags, strokes: Flags, /) -> None:
-        """Leave out measured channels, and strokes."""
-
-
-class _Second(NamedTuple):
-    """Samples of a second that begins at `stamp` (ns), and the failing channels to leave out; or a change."""
-
-    stamp: int
-    block: Any = None
-    left_out: tuple[Flags, Flags] | None = None
-    change: Change | None = None
 
 
 class FaultTwins:
@@ -123,7 +65,7 @@ class FaultTwins:
             search.close()
 
     @cached_property
-    def _search(self) -> Callable[[_Second], list[Alarm]]:
+    def _search(self) -> Callable[[Second], list[Alarm]]:
         return ChildCall(FaultSearch, *self._given) if self._is_live else FaultSearch(*self._given)
 
     # -- samples in
@@ -157,7 +99,7 @@ class FaultTwins:
     def change(self, change: Change) -> None:
         """Take a change before the samples that follow."""
         self._close()
-        self._hand_over(_Second(change.stamp, change=change))
+        self._hand_over(Second(change.stamp, change=change))
 
     def _close(self) -> None:
         """Hand the pending samples to the twins."""
@@ -165,13 +107,13 @@ class FaultTwins:
             columns = zip(*((part.streams, part.stamps, part.values) for part in parts), strict=True)
             streams, stamps, values = map(np.concatenate, columns)
             block = parts[0]._replace(streams=streams, stamps=stamps, values=values)
-            self._hand_over(_Second(self._second * SECOND, block, self._left_out))
+            self._hand_over(Second(self._second * SECOND, block, self._left_out))
         self._pending = []
 
-    def _hand_over(self, second: _Second) -> None:
+    def _hand_over(self, second: Second) -> None:
         self._results.append((second.stamp + SECOND + DELAY, self._worker.submit(self._followed, second)))
 
-    def _followed(self, second: _Second) -> list[Alarm]:
+    def _followed(self, second: Second) -> list[Alarm]:
         """Let the search follow a second; begin another one if its process has been ended, such as for want of memory."""
         try:
             return self._search(second)
@@ -199,236 +141,6 @@ class FaultTwins:
         return list(self._lasting.values())
 
 
-class FaultSearch:
-    """Twins of all fault hypotheses: a call with a second of samples, or a change, returns the alarms that begin or end.
-
-    Parameters
-    ----------
-    scene : Scene
-        Boom with its load.
-    make : callable
-        Hypothesis -> its twin.
-    settings : Settings
-        With the posterior probability required to name a cause, and the errors of the scene.
-    reads : StrokeReading
-        Quantity that drives the model.
-    """
-
-    def __init__(
-        self,
-        scene: Scene,
-        make: Callable[[Hypothesis], Follower],
-        settings: Settings,
-        reads: StrokeReading = StrokeReading.LENGTH,
-    ) -> None:
-        self._scene, self._make, self._settings, self._reads = scene, make, settings, reads
-        self._recent: deque[_Second] = deque(maxlen=MEMORY)
-        self._change: Change | None = None
-        self._creep = CreepMonitor(scene)
-        self._named: dict[Fault, Alarm] = {}
-        self._zeros_before: dict[str, tuple[int, float]] = {}  # place among a sensor's zeros, and its value before the onset
-        self._begin()
-
-    def _begin(self) -> None:
-        """Make twins of the boom as believed, without each named fault (except ``off``), and with each other fault."""
-        known = tuple(self._named)
-        causes = {fault.cause for fault in known}
-        fewer = [(fault, tuple(each for each in known if each is not fault)) for fault in known if fault.kind != "off"]
-        more = [(fault, (*known, fault)) for fault in possible_faults(self._scene, self._reads) if fault.cause not in causes]
-        self._faults, self._hypotheses, self._twins = list[Fault](), list[Hypothesis](), list[Follower]()
-        for fault, faults in [(None, known), *fewer, *more]:
-            try:
-                each = hypothesis(self._scene, faults)
-                twin = self._made(each)
-                for second in list(self._recent)[-WARM_UP:]:
-                    _feed(twin, each, second)
-                self._twins.append(twin)
-            except BoomTwinError:  # an impossible boom, such as one with a part too soft to hold it
-                continue
-            self._hypotheses.append(each)
-            self._faults += [] if fault is None else [fault]
-        self._decide_anew()
-
-    def _decide_anew(self) -> None:
-        """Discard all evidence of faults."""
-        self._decision, self._age = Evidence(self._scene, self._faults, self._settings), 0
-        self._evidence = np.array([twin.evidence for twin in self._twins])
-
-    def _made(self, each: Hypothesis) -> Follower:
-        twin = self._make(each)
-        if self._change is not None:
-            twin.requests.repeat(_changed(self._change, each))
-        return twin
-
-    def __call__(self, second: _Second) -> list[Alarm]:
-        """Let all twins take a second or a change; return the alarms that begin or end."""
-        if second.change is not None:
-            self._recent.clear()
-            self._change = second.change
-            for each, twin in zip(self._hypotheses, self._twins, strict=True):
-                twin.requests.repeat(_changed(second.change, each))
-            self._decide_anew()
-            return []
-        self._recent.append(second)
-        leaks = [] if self._reads is StrokeReading.ANGLE else self._creep.take(second.stamp, second.block)
-        if leaks:
-            self._decide_anew()
-        restarts = self._twins[0].restarts
-        for each, twin in zip(self._hypotheses, self._twins, strict=True):
-            _feed(twin, each, second)
-        if (
-            self._twins[0].restarts > restarts
-        ):  # it has forgotten zeros and load, so any other would gain by what it still knows
-            self._recent.clear()
-            self._begin()
-            return leaks
-        return [*leaks, *self._decided(second.stamp)]
-
-    def _decided(self, stamp: int) -> list[Alarm]:
-        """Return the alarms of named faults that begin or end with the evidence of a second."""
-        before, self._evidence = self._evidence, np.array([twin.evidence for twin in self._twins])
-        grown = self._evidence - before
-        self._age += 1
-        if self._age <= SETTLING:
-            return []
-        if (fault := self._back_again()) is not None:
-            return self._ended(fault, stamp)
-        verdict = self._decision.take(stamp, grown)
-        return [] if verdict is None else self._name(verdict, stamp)
-
-    def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
-        """Name the fault of a verdict, or end it if it is named; return its alarm.
-
-        A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show.
-        """
-        fault = self._faults[verdict.place]
-        if fault in self._named:
-            return self._ended(fault, verdict.onset)
-        if fault.cause.startswith("cylinder_") and fault.kind == "softer":
-            creeps = int(fault.channel.removeprefix("cylinder_")) - 1 in self._creep.creeping
-            if creeps or stamp - verdict.onset < SPAN * SECOND:
-                return []
-        if (found := self._sized(fault, verdict.onset)) is None:
-            self._decide_anew()
-            return []
-        sized, spread, onset = found
-        ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
-        evidence = evidence_of(sized, spread) if fault.is_told else ""
-        alarm = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
-        self._named[sized] = alarm
-        self._begin()
-        return [alarm] if fault.is_told else []
-
-    def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
-        """End a named fault at a stamp (ns); return its alarm."""
-        alarm = replace(self._named.pop(fault), until=stamp)
-        self._begin()
-        return [alarm] if fault.is_told else []
-
-    def _back_again(self) -> Fault | None:
-        """Return a named sensor fault whose zero is nearly back at its value before the onset."""
-        for fault in self._named:
-            if fault.kind == "off":
-                axis, before = self._zeros_before[fault.cause]
-                now, _ = self._twins[0].zeros(hypothesis(self._scene, (fault,)).doubted)
-                if abs(now[axis] - before) < CAME_BACK * abs(fault.size):
-                    return fault
-        return None
-
-    def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float, int] | None:
-        """Return a fault of the most likely size, its standard deviation, and its most likely onset, not before `onset` (ns).
-
-        Twins of larger and smaller sizes follow the recent seconds until the likelihood falls on both sides. None if the
-        size is not surely larger than the largest that a healthy boom seems to have, or a force's below the set deviation.
-        """
-        odds = self._settings.name_odds
-        sure = math.log(odds / (1.0 - odds))
-        if fault.kind == "off":
-            changed, spread = self._change_of_zero(fault, onset)
-            least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
-            is_found = 0.5 * (changed.size / spread) ** 2 > sure and abs(changed.size) >= least
-            return (changed, spread, onset) if is_found else None
-        usual = usual_size(self._scene, fault, self._settings.scene_error)
-        least = NormalDist().inv_cdf(0.5 + 0.5 * odds) * usual
-        healthy = self._course(fault._replace(size=least), onset)
-
-        def gained(size: float) -> Array:
-            """Return the gain of a size by onset: the sum of those of the seconds from there."""
-            gains = self._course(fault._replace(size=size), onset) - healthy
-            return np.asarray(gains[::-1].cumsum()[::-1])
-
-        sizes = [fault.size / RATIO, fault.size]
-        gains = [gained(size) for size in sizes]
-        while gains[-1].max() > gains[-2].max():
-            sizes.append(RATIO * sizes[-1])
-            gains.append(gained(sizes[-1]))
-        while gains[0].max() > gains[1].max() and sizes[0] > least:
-            sizes.insert(0, sizes[0] / RATIO)
-            gains.insert(0, gained(sizes[0]))
-        best = int(np.argmax([each.max() for each in gains]))
-        if best == 0 or TEMPER * gains[best].max() < sure:
-            return None
-        first, ratios = int(gains[best].argmax()), np.array(sizes[best - 1 : best + 2]) / sizes[best]
-        curve, slope, _ = np.polyfit(ratios - 1.0, [each[first] for each in gains[best - 1 : best + 2]], 2)
-        shift, spread = np.clip(-0.5 * slope / curve, ratios[0] - 1.0, ratios[2] - 1.0), (-2.0 * TEMPER * curve) ** -0.5
-        sized = fault._replace(size=float(sizes[best] * (1.0 + shift)))
-        return sized, math.hypot(sizes[best] * spread, usual), onset + first * SECOND
-
-    def _course(self, fault: Fault, onset: int) -> Array:
-        """Return the log likelihood of each recent second since the onset; `IMPOSSIBLE` for an impossible boom."""
-        total, found = 0.0, list[float]()
-        try:
-            for stamp, twin in self._repeated(fault):
-                found += [twin.evidence - total] * (stamp >= onset)
-                total = twin.evidence
-        except BoomTwinError:
-            return np.full(sum(second.stamp >= onset for second in self._recent), IMPOSSIBLE)
-        return np.array(found)
-
-    def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float]:
-        """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), and the standard deviation."""
-        doubted = hypothesis(self._scene, (fault,)).doubted
-        before: Any = None
-        for stamp, twin in self._repeated(fault):
-            now = twin.zeros(doubted)
-            before = now if before is None or stamp < onset else before
-        change, spread = now[0] - before[0], np.sqrt(now[1] + before[1])
-        axis = int(np.argmax(np.abs(change) / spread))
-        self._zeros_before[fault.cause] = axis, float(before[0][axis])
-        return fault._replace(size=float(change[axis])), float(spread[axis])
-
-    def _repeated(self, fault: Fault) -> Iterator[tuple[int, Follower]]:
-        """Run a twin with a fault over the recent seconds; yield each stamp with the twin after that second."""
-        each = hypothesis(self._scene, (*self._named, fault))
-        twin = self._made(each)
-        for second in self._recent:
-            _feed(twin, each, second)
-            yield second.stamp, twin
-
-
 def _channels(has_value: Flags) -> bytes:
     """Return a key of the channels of a sample that have a value. Channels that its stream lacks may follow."""
     return has_value.tobytes().rstrip(b"\0")
-
-
-def _feed(twin: Follower, each: Hypothesis, second: _Second) -> None:
-    if second.left_out is not None:
-        twin.leave_out(*second.left_out)
-    twin.take(_in_time(second.block, each))
-
-
-def _in_time(block: Any, each: Hypothesis) -> Any:
-    """Return a block with stamps corrected by the delays of a hypothesis, in the order of time."""
-    if not each.delays:
-        return block
-    stamps = block.stamps.copy()
-    for stream, delay in each.delays:
-        stamps -= round(delay * SECOND) * (block.streams == list(Stream).index(stream))
-    order = np.argsort(stamps, kind="stable")
-    return block._replace(streams=block.streams[order], stamps=stamps[order], values=block.values[order])
-
-
-def _changed(change: Change, each: Hypothesis) -> Change:
-    """Return a change with the load of a hypothesis."""
-    load = each.load(change.settings["payload"], change.settings["line_fill"])
-    return replace(change, settings=change.settings | load)

@@ -15,7 +15,8 @@ from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
 from ..errors import BoomTwinError, SolverError, UsageError
 from ..health.causes import Hypothesis
-from ..health.fault_twins import FaultTwins, Follower
+from ..health.fault_search import Follower
+from ..health.fault_twins import FaultTwins
 from ..health.monitor import HealthMonitor
 from ..kernels.tables import SENTENCES
 from ..scene.edit import loaded

@@ -44,7 +44,7 @@ class Twin(SampleTaker):
     doubted : collection of str
         Channels of angle sensors, of forces and of the IMU whose zeros may drift by any amount.
     causes : bool
-        With `health`, causes of faults are named, see `boom_twin.health.fault_twins`.
+        With `health`, causes of faults are named, see `boom_twin.health.fault_search`.
     is_live : bool
         True in a live node: the fault twins run in a process of their own, and `update` does not wait for them.
     places : mapping of str to Place, optional

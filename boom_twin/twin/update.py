@@ -14,7 +14,8 @@ import numpy as np
 from ..deviation.channels import write_expected_readings
 from ..deviation.sensor_model import TURN
 from ..deviation.sensors import take_sensor
-from ..deviation.step import step_lengths, write_tip_estimate
+from ..deviation.step import step_lengths
+from ..deviation.tip_estimate import write_tip_estimate
 from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import OK

@@ -1,0 +1,121 @@
+"""Estimate of the tip by all sensors, and its covariance: that of the filter, doubtful transducers, errors of the scene."""
+
+from __future__ import annotations
+
+import math
+
+from ..kernels.jit import inner
+from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y
+from .channels import READS_COORDINATE
+from .estimate_row import (
+    ACCELERATION,
+    ACCELERATION_COVARIANCE,
+    COORDINATES,
+    FORCE,
+    FORCE_VARIANCE,
+    MODES,
+    RATES,
+    TIP,
+    TIP_COVARIANCE,
+    VELOCITY,
+    VELOCITY_COVARIANCE,
+)
+from .kalman import ANGLE_ZERO
+from .rows import acceleration_row, column_row, difference, rate_row, read, spread_of
+from .states import ESTIMATE, PREDICTION, force_place, zero_place
+
+MASS_PART = 0.77  # variance of the tip by errors of the masses over that of EI: a cantilever of four equal sections
+FAULT_CHANCE, FAULT = 0.01, 0.03  # that a sensor is off, and by how much as an angle of its joint, rad
+
+
+@inner
+def write_tip_estimate(p, f, live, results, out):
+    """Write the estimate beside the newest prediction; see `boom_twin.deviation.estimate_row.WIDTH`."""
+    n, m, size, load = p.drives.shape[0], p.modes[0], zero_place(p), force_place(p)
+    mean, expected = f.mean[ESTIMATE], f.mean[PREDICTION]
+    for a in range(3):
+        column_row(p, p.readings, n + a, 1.0, f.rows[a])
+        rate_row(p, n + a, f.rows[3 + a])
+        acceleration_row(p, n + a, f.rows[6 + a])
+        out[TIP + a] = results.tip[0, a] + difference(f.rows[a], mean, expected, size)
+        out[VELOCITY + a] = results.tip[1, a] + difference(f.rows[3 + a], mean, expected, size)
+        out[ACCELERATION + a] = results.tip[2, a] + difference(f.rows[6 + a], mean, expected, size)
+    write_covariance(f, 0, size, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
+    add_doubt(p, f, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
+    if not reads_points(p, f):
+        add_scene_error(p, f, live, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
+    write_covariance(f, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
+    write_covariance(f, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
+    for j in range(MODES):
+        out[COORDINATES + j] = f.mean[ESTIMATE, j] if j < m else math.nan
+        out[RATES + j] = f.mean[ESTIMATE, m + j] if j < m else math.nan
+    covariance = f.spread[ESTIMATE]
+    for a in range(2):
+        fast, slow = load + a, load + 2 + a
+        out[FORCE + a] = f.mean[ESTIMATE, fast] + f.mean[ESTIMATE, slow]
+        out[FORCE_VARIANCE + a] = covariance[fast, fast] + 2.0 * covariance[fast, slow] + covariance[slow, slow]
+
+
+@inner
+def add_doubt(p, f, out):
+    """Add the variance by stroke transducers that are off to the upper triangle of the tip's covariance.
+
+    An angle sensor and the lengths differ because the angle's zero is off by ANGLE_ZERO, or either sensor by FAULT (rad,
+    normal, equal odds). The posterior probability that it is the transducer weighs the square of the tip's way by it.
+    """
+    n = p.drives.shape[0]
+    for i in range(n):
+        apart = f.apart[i] - (f.apart[i - 1] if i > 0 and p.absolute[i] else 0.0)
+        fault = FAULT_CHANCE / FAULT * math.exp(-0.5 * (apart / FAULT) ** 2)
+        usual = math.exp(-0.5 * (apart / ANGLE_ZERO) ** 2) / ANGLE_ZERO
+        share = fault / (usual + 2.0 * fault) * (apart / p.slope[i]) ** 2
+        add_square(out, share, p.readings[2 + i, n : n + 3])
+
+
+@inner
+def add_square(out, share, moved):
+    """Add `share` times the product of `moved` (x, y, angle) with itself to an upper triangle."""
+    at = 0
+    for a in range(3):
+        for b in range(a, 3):
+            out[at] += share * moved[a] * moved[b]
+            at += 1
+
+
+@inner
+def reads_points(p, f):
+    """Return True if the estimate has read the position of a point, which also shows what the scene has wrong."""
+    for c in range(p.channels.shape[0]):
+        if p.channels[c].kind == READS_COORDINATE and p.behind[0] > p.channels[c].zero and not f.masked[c]:
+            return True
+    return False
+
+
+@inner
+def add_scene_error(p, f, live, out):
+    """Add the variance by wrong stiffnesses and masses of sections to the upper triangle of the tip's covariance.
+
+    The bending of section i moves the tip by c_i = (d_i + a_i e_z x r_i, a_i), with the deflection d_i and the turn a_i of its
+    end against its root, and r_i from its end to the tip. Independent relative errors of the EI add the sum of c_i c_i^T times
+    their variance. Those of the masses add `MASS_PART` times as much.
+    """
+    n, share2 = p.drives.shape[0], (1.0 + MASS_PART) * f.noise.scene_error * f.noise.scene_error
+    tip, moved = live.frames[p.roots[n]], f.row
+    for i in range(n):
+        root, end = live.frames[p.roots[i]], live.frames[p.roots[i + 1] - (1 if i < n - 1 else 0)]
+        heading, turn = root[FRAME_ANGLE], end[FRAME_ANGLE] - root[FRAME_ANGLE]
+        moved[0] = end[FRAME_X] - root[FRAME_X] - p.lengths[i] * math.cos(heading) - turn * (tip[FRAME_Y] - end[FRAME_Y])
+        moved[1] = end[FRAME_Y] - root[FRAME_Y] - p.lengths[i] * math.sin(heading) + turn * (tip[FRAME_X] - end[FRAME_X])
+        moved[2] = turn
+        add_square(out, share2, moved)
+
+
+@inner
+def write_covariance(f, first, size, out):
+    """Write the upper triangle of the estimate's covariance of what three of `f.rows` read."""
+    at = 0
+    for a in range(first, first + 3):
+        spread_of(f.rows[a], f.spread[ESTIMATE], f.gain, size)
+        for b in range(a, first + 3):
+            out[at] = read(f.rows[b], f.gain, size)
+            at += 1
