@@ -6,7 +6,7 @@ import math
 
 from ..kernels.jit import inner
 from .kalman import DRIVE_TIME
-from .mixture import copy_model, first_model
+from .mixture import LEAST_CHANCE, copy_model, first_model
 from .states import BURST, ESTIMATE, FED, OPEN, PREDICTION, VALVES, drive_place, force_place
 
 LEARN_LOAD = 3.0  # s, in which the variance of the fast load is learnt
@@ -14,8 +14,9 @@ SURPRISE = 9.0  # largest square of a value that counts in the learnt variance, 
 LEAST_JERK, MOST_JERK = 1e-3, 10.0  # m^2/s^5
 OPENING = 0.5  # m/s^2, by which a valve that opens may accelerate the tip: standard deviation
 JERK_RISE, JERK_FALL = 0.05, 0.5  # s, in which that density is learnt
-OPENED, SHUT = 4.0, 3.0  # standard deviations of a drive's rate: above OPENED it moves, below SHUT it may stand still
-SHUT_TIME = 0.15  # s below SHUT after which a valve is believed closed
+MOVING = 0.1  # m/s, by which a drive that moves carries the tip: standard deviation
+OPENED = 5.0  # logarithm of the odds for a moving drive, above which its valve is believed open
+SHUT_TIME = 0.15  # s with odds against it, after which a valve is believed closed
 LEARN_LENGTH = 0.02  # share of a third difference that counts for the noise of a length
 UNEVEN = 0.5  # largest relative change of the sampling interval within a third difference
 
@@ -28,9 +29,9 @@ def watch_valves(p, f, h, mixture, size):
     moving = first + OPEN
     for i in range(n):
         at = drive + n + i
-        deviation = abs(f.x[moving, at]) / math.sqrt(max(f.p[moving, at, at], 1e-300))
-        still[i] = still[i] + h if deviation < SHUT else 0.0
-        if deviation > OPENED and f.chances[moving] > 0.5:
+        odds = log_odds(f.x[moving, at], f.p[moving, at, at], MOVING * MOVING / reach2(p, i))
+        still[i] = still[i] + h if odds < 0.0 else 0.0
+        if odds > OPENED and f.chances[moving] > 0.5:
             opened |= is_open[i] == 0
             is_open[i] = 1
         elif still[i] > SHUT_TIME:
@@ -38,6 +39,25 @@ def watch_valves(p, f, h, mixture, size):
     if opened:
         copy_model(f, moving, first + VALVES, size)
         copy_model(f, moving, first + BURST, size)
+        f.chances[first + VALVES] += f.chances[first + BURST]
+        f.chances[first + BURST] = LEAST_CHANCE
+
+
+@inner
+def log_odds(rate, variance, moving2):
+    """Return the logarithm of the odds of a drive that moves, by a rate of variance `moving2`, against one that stands still.
+
+    It is the Bayes factor of a rate that is known with `variance`.
+    """
+    ratio = moving2 / max(variance, 1e-300)
+    return 0.5 * (rate * rate / max(variance, 1e-300) * ratio / (1.0 + ratio) - math.log(1.0 + ratio))
+
+
+@inner
+def reach2(p, i):
+    """Return the square of the tip's motion by drive `i`."""
+    n = p.drives.shape[0]
+    return max(p.readings[2 + i, n] ** 2 + p.readings[2 + i, n + 1] ** 2, 1e-9)
 
 
 @inner
@@ -50,8 +70,7 @@ def learn_jerk(p, f, h):
     n = p.drives.shape[0]
     for i in range(n):
         if f.is_open[PREDICTION, i] == 0 and not (p.reads_angle and p.sways[i]):
-            reach2 = p.readings[2 + i, n] ** 2 + p.readings[2 + i, n + 1] ** 2
-            f.jerk[i] = min(2.0 / DRIVE_TIME * OPENING * OPENING / max(reach2, 1e-9), MOST_JERK)
+            f.jerk[i] = min(2.0 / DRIVE_TIME * OPENING * OPENING / reach2(p, i), MOST_JERK)
             continue
         at = drive_place(p) + 2 * n + i
         shown = 2.0 / DRIVE_TIME * (f.x[OPEN, at] * f.x[OPEN, at] + f.p[OPEN, at, at])

@@ -8,8 +8,9 @@ from ..kernels.jit import inner
 from .states import ALL_VALVES, BURST, OPEN, PREDICTION, VALVES
 
 MODELS = BURST + 1  # of a mixture
+LEAST_CHANCE = 1e-9
 OPENS, CLOSES = 0.3, 1.0  # 1/s, rates at which valves open, and are closed again
-COMES, STAYS = 0.2, 1.0  # 1/s, rates at which a load comes, and is usual again
+COMES, STAYS = 0.2, 1.0  # 1/s, rates at which a load comes while all valves are closed, and is usual again
 
 
 @inner
@@ -29,10 +30,15 @@ def first_model(mixture):
 
 @inner
 def interact(f, mixture, size, h):
-    """Mix the models of a mixture before a step of `h` (s), by the rates at which valves and load change."""
-    first, switch = first_model(mixture), f.switch
+    """Mix the models of a mixture before a step of `h` (s), by the rates at which valves and load change.
+
+    No sudden load is expected while a valve is open: another that opens explains the same lengths, and is far likelier.
+    """
+    first, switch, closed = first_model(mixture), f.switch, 1
+    for i in range(f.is_open.shape[1]):
+        closed *= 1 - f.is_open[mixture, i]
     opens, closes = 1.0 - math.exp(-OPENS * h), 1.0 - math.exp(-CLOSES * h)
-    comes, stays = 1.0 - math.exp(-COMES * h), 1.0 - math.exp(-STAYS * h)
+    comes, stays = 1.0 - math.exp(-COMES * closed * h), 1.0 - math.exp(-STAYS * h)
     switch[VALVES, VALVES], switch[VALVES, OPEN], switch[VALVES, BURST] = 1.0 - opens - comes, opens, comes
     switch[OPEN, VALVES], switch[OPEN, OPEN], switch[OPEN, BURST] = closes, 1.0 - closes, 0.0
     switch[BURST, VALVES], switch[BURST, OPEN], switch[BURST, BURST] = stays, opens, 1.0 - stays - opens
@@ -85,7 +91,7 @@ def weigh_models(f, mixture):
     for k in range(1, MODELS):
         most = max(most, f.likely[first + k])
     for k in range(MODELS):
-        f.chances[first + k] = max(f.chances[first + k] * math.exp(f.likely[first + k] - most), 1e-9)
+        f.chances[first + k] = max(f.chances[first + k] * math.exp(f.likely[first + k] - most), LEAST_CHANCE)
         total += f.chances[first + k]
     for k in range(MODELS):
         f.chances[first + k] /= total

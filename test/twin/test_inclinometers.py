@@ -79,7 +79,7 @@ def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene, mount):
         found += [residuals.normalised[3] for residuals in twin.update(Sample(Stream.ANGLES, sample.stamp, angles)).residuals]
     assert len(found) == rows
     least = 0.2 if mount == "head" else 0.6  # a share of the error by acceleration is stated as not known
-    assert abs(np.mean(found)) < 0.3 and least < np.std(found) < 1.15
+    assert abs(np.mean(found)) < 0.4 and least < np.std(found) < 1.15
 
 
 SCENE, STEP, EVERY = load_scene(), 1.25e-3, 4
