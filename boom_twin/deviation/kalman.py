@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 
-from ..kernels.jit import inner
+from ..kernels.jit import inner, kernel
 from .channels import IMU_DRIFT, IMU_SCALE, IMU_TURN, TIP_IMU_STATES
-from .rows import spread_of
-from .states import PREDICTION, drive_place, force_place, zero_place
+from .rows import clear, read, spread_of
+from .states import PREDICTION, drive_place, force_place, whole, zero_place
 
 FAST, SLOW = 0.1, 60.0  # s, time constants of the two parts of the load
 DRIVE_TIME = 0.12  # s, correlation time of a drive's acceleration
 LEAK = 1e-14  # m^2/s, random walk of a drive
 ANGLE_ZERO, ANGLE_DRIFT = 2e-4, 1e-5  # rad; rad in a root second: sensors' zeros, and the error of the model's statics
+GAINS = 4  # that correct a covariance at once, so that it is read and written once for all
 FORCE_ZERO, FORCE_REST, FORCE_TURN = 1.0, 0.003, 0.02  # share of the force; in a root second; in a root radian of all joints
 
 
@@ -110,16 +111,16 @@ def transit(p, f, k, size, h, loads, least2):
     for i in range(2 * p.modes[0]):
         x[i] += f.inputs[i]
     for i in range(own):
-        multiply_row(f, i, covariance, size, f.half[i])
+        multiply_row(f, i, covariance, whole(size), f.half[i])
     for i in range(own):
         for j in range(own):
             f.turned[i, j] = f.half[j, i]
         for j in range(own, size):
             covariance[i, j] = covariance[j, i] = f.half[i, j]
     for i in range(own):
-        multiply_row(f, i, f.turned, i + 1, covariance[i])
-        for j in range(i):
-            covariance[j, i] = covariance[i, j]
+        multiply_row(f, i, f.turned, whole(i + 1), f.row)
+        for j in range(i + 1):
+            covariance[i, j] = covariance[j, i] = f.row[j]
     if size > own:
         drift_lags(p, x, covariance, size, h)
     for i in range(size):
@@ -185,22 +186,64 @@ def free_sensors(p, f, covariance):
 
 
 @inner
-def correct(x, covariance, row, gain, innovation, variance, size):
+def correct(x, covariance, row, gains, innovation, variance, size):
     """Correct a state and its covariance by a reading; return the variance of the innovation."""
-    spread_of(row, covariance, gain, size)
-    expected = variance
-    for k in range(size):
-        expected += row[k] * gain[k]
-    take_innovation(x, covariance, gain, innovation, expected, size)
+    expected = variance + gain_after(covariance, row, gains, 0, size)
+    take_innovation(x, covariance, gains, 0, innovation, expected, size)
+    take_gains(covariance, gains, 1, size)
     return expected
 
 
 @inner
-def take_innovation(x, covariance, gain, innovation, expected, size):
-    """Correct a state and its covariance by an innovation of variance `expected`; `gain` is its covariance with the state."""
-    share = innovation / expected
+def gain_after(covariance, row, gains, count, size):
+    """Write gain `count`, the covariance of all states with the reading of `row`; return the variance of that reading.
+
+    The gains before are of readings that have corrected the state, but not yet the covariance.
+    """
+    gain = gains[count]
+    spread_of(row, covariance, gain, size)
+    for c in range(count):
+        subtract(gain, read(row, gains[c], size), gains[c], size)
+    return read(row, gain, size)
+
+
+@inner
+def subtract(gain, share, other, size):
+    """Subtract a share of another gain."""
+    for i in range(whole(size)):
+        gain[i] -= share * other[i]
+
+
+@inner
+def take_innovation(x, covariance, gains, count, innovation, expected, size):
+    """Correct a state by an innovation of variance `expected`, and divide its gain by the root; return how many gains are left.
+
+    Four gains correct the covariance.
+    """
+    gain, scale = gains[count], 1.0 / math.sqrt(expected)
+    for i in range(whole(size)):
+        gain[i] *= scale
     for i in range(size):
-        x[i] += gain[i] * share
-        part = gain[i] / expected
-        for k in range(size):
-            covariance[i, k] -= part * gain[k]
+        x[i] += gain[i] * (innovation * scale)
+    if count + 1 < GAINS:
+        return count + 1
+    take_gains(covariance, gains, GAINS, size)
+    return 0
+
+
+@kernel
+def take_gains(covariance, gains, count, size):
+    """Subtract g g^T of `count` gains g (4, s) from a covariance (s, s), two rows at a time."""
+    width = whole(size)
+    if count == 0:
+        return
+    for c in range(count, GAINS):
+        clear(gains[c], width)
+    first, second, third, fourth = gains[0], gains[1], gains[2], gains[3]
+    for i in range(0, size, 2):
+        line, below = covariance[i], covariance[i + 1]
+        a, b, c, d = first[i], second[i], third[i], fourth[i]
+        e, g, h, j = first[i + 1], second[i + 1], third[i + 1], fourth[i + 1]
+        for k in range(width):
+            line[k] -= a * first[k] + b * second[k] + c * third[k] + d * fourth[k]
+            below[k] -= e * first[k] + g * second[k] + h * third[k] + j * fourth[k]

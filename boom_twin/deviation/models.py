@@ -29,10 +29,20 @@ import math
 
 from ..kernels.jit import inner, kernel
 from .channels import IMU_ZERO
-from .kalman import ANGLE_ZERO, FAST, correct, free_sensors, make_transition, transit
+from .kalman import (
+    ANGLE_ZERO,
+    FAST,
+    free_sensors,
+    gain_after,
+    make_transition,
+    subtract,
+    take_gains,
+    take_innovation,
+    transit,
+)
 from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
 from .mixture import MODELS, copy_model, first_model, interact, mix, weigh_models
-from .rows import SWAY_SHARE, clear, column_row, drive_row, read, variance_of
+from .rows import SWAY_SHARE, column_row, drive_row, read, variance_of
 from .states import (
     ALL_BURST,
     ALL_VALVES,
@@ -46,6 +56,7 @@ from .states import (
     all_states,
     drive_place,
     force_place,
+    whole,
     zero_place,
 )
 
@@ -155,15 +166,19 @@ def states_of(p, mixture):
 @inner
 def hold_still(p, f, k, is_open, size):
     """Correct model `k` by readings of zero rate and acceleration of drives behind closed valves."""
-    n, drive = p.drives.shape[0], drive_place(p)
+    n, drive, count, gains, width = p.drives.shape[0], drive_place(p), 0, f.gains[0], whole(size)
     for i in range(n):
         if is_open[i] == 0 and not f.deaf[i]:
             for order in (1, 2):
-                at = drive + order * n + i
-                clear(f.row, size)
-                f.row[at] = 1.0
+                at, gain = drive + order * n + i, gains[count]
+                for j in range(width):
+                    gain[j] = f.p[k, at, j]
+                for c in range(count):
+                    subtract(gain, gains[c, at], gains[c], size)
                 noise = CLOSED_RATE if order == 1 else CLOSED_ACCELERATION
-                correct(f.x[k], f.p[k], f.row, f.gain, -f.x[k, at], noise * noise, size)
+                expected = gain[at] + noise * noise
+                count = take_innovation(f.x[k], f.p[k], gains, count, -f.x[k, at], expected, size)
+    take_gains(f.p[k], gains, count, size)
 
 
 @inner
@@ -190,12 +205,14 @@ def drive_noise2(p, f, i):
 @inner
 def take_lengths(p, f, k, size, y):
     """Correct model `k` by readings `y` (n; NaN = missing); return their log likelihood."""
-    total = 0.0
+    total, count, gains = 0.0, 0, f.gains[0]
     for i in range(y.shape[0]):
         if math.isfinite(y[i]) and not f.deaf[i]:
             innovation = y[i] - drive_row(p, f, i, f.x[k], f.row, size)
-            expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, drive_noise2(p, f, i), size)
+            expected = drive_noise2(p, f, i) + gain_after(f.p[k], f.row, gains, count, size)
+            count = take_innovation(f.x[k], f.p[k], gains, count, innovation, expected, size)
             total -= 0.5 * (innovation * innovation / expected + math.log(expected))
+    take_gains(f.p[k], gains, count, size)
     return total
 
 

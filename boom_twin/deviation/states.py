@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -109,10 +110,9 @@ class Filters(NamedTuple):
     evidence: Array
     half: Array
     turned: Array
-    mixed_x: Array
-    mixed_p: Array
     row: Array
     gain: Array
+    gains: Array
     rows: Array
     likely: Array
     switch: Array
@@ -127,10 +127,10 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
     """Return filters of a boom with so many joints, modes at most, and these measured channels."""
     n, channels, sites, behind = joints, len(measured.channels), len(measured.sites), 4 + 2 * joints + len(measured.errors)
     own = 2 * modes + LOADS + 3 * joints
-    states = own + behind + DELAYED
+    states = whole(own + behind + DELAYED)
     return Filters(
-        x=np.zeros((6, states)), p=np.zeros((6, states, states)), chances=np.zeros(6), mean=np.zeros((2, states)),
-        spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros((2, n), np.int64),
+        x=np.zeros((6, states)), p=vectors(6, states, states), chances=np.zeros(6), mean=np.zeros((2, states)),
+        spread=vectors(2, states, states), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros((2, n), np.int64),
         still=np.zeros((2, n)), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
@@ -140,12 +140,20 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         places=np.zeros((own, 8 + n), np.int64), weights=np.zeros((own, 8 + n)), counts=np.zeros(own, np.int64),
         variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
-        half=np.zeros((own, states)), turned=np.zeros((own, own)), mixed_x=np.zeros((3, states)),
-        mixed_p=np.zeros((3, states, states)),
-        row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((9, states)), likely=np.zeros(6),
-        switch=np.zeros((3, 3)), shares=np.zeros(3), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),
+        half=vectors(own, states), turned=vectors(own, whole(own)),
+        row=vectors(states), gain=vectors(states), gains=vectors(4, 4, states),
+        rows=vectors(9, states), likely=np.zeros(6),
+        switch=np.zeros((3, 3)), shares=np.zeros((3, 3)), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),
         strokes=np.zeros((n, 3)), innovations=np.zeros((n, 2)),
     )  # fmt: skip
+
+
+def vectors(*shape: int) -> Array:
+    """Return zeros at an address from which the processor loads whole vectors fastest; so do rows of a `whole` length."""
+    count = math.prod(shape)
+    room = np.zeros(count + 8)
+    first = -room.ctypes.data // 8 % 8
+    return room[first : first + count].reshape(shape)
 
 
 @inner
@@ -179,3 +187,9 @@ def copy_place(p):
 def all_states(p):
     """Return the number of states of the estimate."""
     return copy_place(p) + p.delayed[0]
+
+
+@inner
+def whole(size):
+    """Return `size` rounded up to whole vectors of the processor; numbers behind `size` in a row are of no account."""
+    return (size + 7) & -8

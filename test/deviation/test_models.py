@@ -86,14 +86,14 @@ def test_covariance_is_propagated_by_the_full_transition_matrix_and_lags_drift()
 
 def test_reading_is_taken_as_the_textbook_has_it() -> None:
     rng = np.random.default_rng(1)
-    root, row, x = rng.normal(size=(6, 6)), rng.normal(size=6), rng.normal(size=6)
+    root, row, x = rng.normal(size=(8, 8)), rng.normal(size=8), rng.normal(size=8)
     covariance, variance, innovation = root @ root.T, 0.3, 0.7
     s = row @ covariance @ row + variance
     gain = covariance @ row / s
-    left = np.eye(6) - np.outer(gain, row)
+    left = np.eye(8) - np.outer(gain, row)
     joseph = left @ covariance @ left.T + variance * np.outer(gain, gain)
     state, found = x.copy(), covariance.copy()
-    assert correct.py_func(state, found, row, np.zeros(6), innovation, variance, 6) == pytest.approx(s)
+    assert correct.py_func(state, found, row, np.zeros((4, 8)), innovation, variance, 8) == pytest.approx(s)
     assert state == pytest.approx(x + gain * innovation)
     assert found == pytest.approx(joseph)
 
