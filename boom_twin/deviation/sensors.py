@@ -124,11 +124,9 @@ def rate_of_row(p, f, row, rates):
     """Write the row of the rate of the reading of `row` at the newest instant."""
     size, h = zero_place(p), f.interval[1]
     clear(rates, all_states(p))
-    for i in range(size):
-        if row[i] != 0.0 and h > 0.0:
-            rates[i] -= row[i] / h
-            for c in range(f.counts[i]):
-                rates[f.places[i, c]] += row[i] / h * f.weights[i, c]
+    if h > 0.0:
+        for j in range(size):
+            rates[j] = (read(row, f.transition[j], size) - row[j]) / h
 
 
 @inner

@@ -59,7 +59,8 @@ class Filters(NamedTuple):
     rates (rad/s) and angular accelerations (rad/s^2) of the chords behind them. swing : (m,) modal forces by these,
     inputs : (2 m,) changes of modal coordinates and rates in a step by them. sway2 : (n,) square of the largest angle by
     which an inclinometer lately erred, rad^2.
-    places, weights, counts : (p, k), (p, k), (p,) columns of the transition matrix by row. variances : (s,) of its noise.
+    modal, transition : (m, 6), (p, p) part of the modes in the transition matrix, and its transpose. variances : (s,) of its
+    noise.
     motion : (sites, 9) predicted x, y, angle of every site, m and rad, their rates, their accelerations.
     shaking : (sites, 2) mean squares of its acceleration, m^2/s^4, and of its rate of turn, rad^2/s^2. felt : (c,) specific
     force that channels of accelerometers read by that, m/s^2.
@@ -101,14 +102,12 @@ class Filters(NamedTuple):
     copies: NDArray[np.int64]
     instants: NDArray[np.int64]
     noise: SensorNoise
-    places: NDArray[np.int64]
-    weights: Array
-    counts: NDArray[np.int64]
+    modal: Array
+    transition: Array
     variances: Array
     felt: Array
     pulls: Array
     evidence: Array
-    half: Array
     turned: Array
     row: Array
     gain: Array
@@ -138,9 +137,8 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         sway2=np.zeros(n), apart=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,
         late=np.zeros(len(Stream)), taken=np.zeros(len(Stream), np.int64), curves=np.zeros((channels, 3)),
         copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
-        places=np.zeros((own, 8 + n), np.int64), weights=np.zeros((own, 8 + n)), counts=np.zeros(own, np.int64),
+        modal=np.zeros((modes, 6)), transition=vectors(own, whole(own)), turned=vectors(own, whole(own)),
         variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
-        half=vectors(own, states), turned=vectors(own, whole(own)),
         row=vectors(states), gain=vectors(states), gains=vectors(4, 4, states),
         rows=vectors(9, states), likely=np.zeros(6),
         switch=np.zeros((3, 3)), shares=np.zeros((3, 3)), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),

@@ -57,10 +57,7 @@ def test_transition_is_that_of_the_continuous_system_with_inputs_held(boom: Boom
 def transition_of(p: Posture, f: Filters, size: int) -> Array:
     """The first `size` rows and columns of the transition matrix as a full one; sensors' errors and copies stay."""
     found, own = np.eye(size), zero_place.py_func(p)
-    found[:own] = 0.0
-    for row in range(own):
-        for k in range(int(f.counts[row])):
-            found[row, f.places[row, k]] += f.weights[row, k]
+    found[:own, :own] = f.transition[:own, :own].T
     return found
 
 
