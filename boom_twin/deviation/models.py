@@ -127,16 +127,14 @@ def step_models(p, f, h, y):
         for mixture in range(mixtures):
             interact(f, mixture, states_of(p, mixture), h)
         make_transition(p, f, h / steps)
-        for _ in range(steps):
-            for mixture in range(mixtures):
-                first = first_model(mixture)
-                for k in range(first, first + MODELS):
-                    least2 = burst2 if k == first + BURST else 0.0
-                    transit(p, f, k, states_of(p, mixture), h / steps, f.load2[mixture], least2)
         for mixture in range(mixtures):
-            for model in (VALVES, BURST):
-                k = first_model(mixture) + model
-                hold_still(p, f, k, f.is_open[mixture], states_of(p, mixture))
+            first, states = first_model(mixture), states_of(p, mixture)
+            for k in range(first, first + MODELS):
+                least2 = burst2 if k == first + BURST else 0.0
+                for _ in range(steps):
+                    transit(p, f, k, states, h / steps, f.load2[mixture], least2)
+                if k != first + OPEN:
+                    hold_still(p, f, k, f.is_open[mixture], states)
     note_innovations(p, f, y)
     evidence = 0.0
     for mixture in range(mixtures):
