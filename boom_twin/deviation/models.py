@@ -181,17 +181,18 @@ def hold_still(p, f, k, is_open, size):
 
 @inner
 def note_innovations(p, f, y):
-    """Write readings `y` less their mean predicted by the mixture, and the variances of the difference."""
+    """Write the rows of readings `y`, these less their mean predicted by the mixture, and the variances of the difference."""
     n = y.shape[0]
     size = zero_place(p) if p.reads_angle else drive_place(p) + n  # a length does not depend on the states behind
     for i in range(n):
-        mean = square = 0.0
-        first = drive_row(p, f, i, f.x[VALVES], f.row, size)
+        mean, square, row = 0.0, 0.0, f.driving[i]
+        reading, first = drive_row(p, f, i, f.x[VALVES], row, size), read(row, f.x[VALVES], size)
+        f.offsets[i] = reading - first
         for k in range(BURST + 1):
-            apart = drive_row(p, f, i, f.x[k], f.row, size) - first
+            apart = read(row, f.x[k], size) - first
             mean += f.chances[k] * apart
-            square += f.chances[k] * (apart * apart + variance_of(f.row, f.p[k], f.gain, size))
-        f.innovations[i, 0], f.innovations[i, 1] = y[i] - first - mean, square - mean * mean + drive_noise2(p, f, i)
+            square += f.chances[k] * (apart * apart + variance_of(row, f.p[k], f.gain, size))
+        f.innovations[i, 0], f.innovations[i, 1] = y[i] - reading - mean, square - mean * mean + drive_noise2(p, f, i)
 
 
 @inner
@@ -206,8 +207,8 @@ def take_lengths(p, f, k, size, y):
     total, count, gains = 0.0, 0, f.gains[0]
     for i in range(y.shape[0]):
         if math.isfinite(y[i]) and not f.deaf[i]:
-            innovation = y[i] - drive_row(p, f, i, f.x[k], f.row, size)
-            expected = drive_noise2(p, f, i) + gain_after(f.p[k], f.row, gains, count, size)
+            innovation = y[i] - f.offsets[i] - read(f.driving[i], f.x[k], size)
+            expected = drive_noise2(p, f, i) + gain_after(f.p[k], f.driving[i], gains, count, size)
             count = take_innovation(f.x[k], f.p[k], gains, count, innovation, expected, size)
             total -= 0.5 * (innovation * innovation / expected + math.log(expected))
     take_gains(f.p[k], gains, count, size)

@@ -67,6 +67,7 @@ class Filters(NamedTuple):
     strokes : (n, 3) predicted lengths (m), their rates and accelerations.
     innovations : (n, 2) newest lengths less what the prediction's mixture expected before them (m), and their variances.
     Where angles drive the model, length2, before, strokes and innovations are of angles, in rad.
+    driving, offsets : (n, s), (n,) rows of what drives the model, and its readings at a state of zeros.
     pulls : (n,) predicted forces, N. evidence : (1,) logarithm of the likelihood of all that was read, up to a constant.
     The others are scratch.
     """
@@ -112,6 +113,8 @@ class Filters(NamedTuple):
     row: Array
     gain: Array
     gains: Array
+    driving: Array
+    offsets: Array
     rows: Array
     likely: Array
     switch: Array
@@ -139,7 +142,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         modal=np.zeros((modes, 6)), transition=vectors(own, whole(own)), turned=vectors(own, whole(own)),
         variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
-        row=vectors(states), gain=vectors(states), gains=vectors(4, 4, states),
+        row=vectors(states), gain=vectors(states), gains=vectors(4, 4, states), driving=vectors(n, states), offsets=np.zeros(n),
         rows=vectors(9, states), likely=np.zeros(6),
         switch=np.zeros((3, 3)), shares=np.zeros((3, 3)), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),
         strokes=np.zeros((n, 3)), innovations=np.zeros((n, 2)),
