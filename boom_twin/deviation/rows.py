@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..kernels.jit import inner
+from ..kernels.jit import inner, kernel
 from .states import all_states, drive_place, force_place, whole, zero_place
 
 SWAY_SHARE = 0.3  # share of the error of an inclinometer by its acceleration that is not known
@@ -57,7 +57,7 @@ def variance_of(row, covariance, gain, size):
     return max(read(row, gain, size), 0.0)
 
 
-@inner
+@kernel
 def spread_of(row, covariance, gain, size):
     """Write the covariance of all states with the reading of a row."""
     width = whole(size)
