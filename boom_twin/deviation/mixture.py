@@ -76,8 +76,9 @@ def apart(f, first, size):
 
 @inner
 def between(shares, two, three):
-    """Return the weights of the second and of the third state's differences from the first, in a row of the covariance between
-    the models' states. `two`, `three` are these differences in the state of the row.
+    """Return the weights of both of `apart` in the row of the covariance among the models' means whose state they have there.
+
+    With d_0 = 0, the covariance sum w d d^T - (sum w d) (sum w d)^T has these rows.
     """
     return (
         shares[1] * ((1.0 - shares[1]) * two - shares[2] * three),
