@@ -109,7 +109,7 @@ def weigh_and_correct(f, x, covariance, innovation, variance, size):
         if f.row[i] != 0.0:
             expected += f.row[i] * read(f.row, covariance[i], size)
     excess = max(innovation * innovation / (OUTLIER * OUTLIER) - expected, 0.0)
-    return correct(x, covariance, f.row, f.gain, innovation, variance + excess, size)
+    return correct(x, covariance, f.row, f.gains[0], innovation, variance + excess, size)
 
 
 @inner

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import math
 
-from ..kernels.jit import inner
+from ..kernels.jit import inner, kernel
 from .channels import IMU_DRIFT, IMU_SCALE, IMU_TURN, TIP_IMU_STATES
-from .rows import spread_of
-from .states import PREDICTION, drive_place, force_place, zero_place
+from .rows import clear, read, spread_of
+from .states import PREDICTION, drive_place, force_place, whole, zero_place
 
 FAST, SLOW = 0.1, 60.0  # s, time constants of the two parts of the load
+QQ, QV, QF, VQ, VV, VF = range(6)  # shares in coordinate and rate of a mode after a step: of both before, and of a force
 DRIVE_TIME = 0.12  # s, correlation time of a drive's acceleration
 LEAK = 1e-14  # m^2/s, random walk of a drive
 ANGLE_ZERO, ANGLE_DRIFT = 2e-4, 1e-5  # rad; rad in a root second: sensors' zeros, and the error of the model's statics
+GAINS = 4  # that correct a covariance at once, so that it is read and written once for all
 FORCE_ZERO, FORCE_REST, FORCE_TURN = 1.0, 0.003, 0.02  # share of the force; in a root second; in a root radian of all joints
-
-
-@inner
-def put_weight(f, row, place, weight):
-    """Add an entry to a row of the transition matrix."""
-    f.places[row, f.counts[row]], f.weights[row, f.counts[row]] = place, weight
-    f.counts[row] += 1
 
 
 @inner
@@ -29,48 +24,24 @@ def make_transition(p, f, h):
 
     `f.inputs` (2 m) are the changes of modal coordinates and rates by the modal forces `f.swing`.
     """
-    n, m, load, drive = p.drives.shape[0], p.modes[0], force_place(p), drive_place(p)
-    f.interval[1] = h
-    f.counts[:], f.variances[:] = 0, 0.0
+    n, m, zero, drive = p.drives.shape[0], p.modes[0], zero_place(p), drive_place(p)
+    f.interval[1], f.variances[:], f.turned[:] = h, 0.0, 0.0
     for j in range(m):
-        omega2, half = p.omega[j] * p.omega[j], 0.5 * p.decay[j]
+        modal, omega2, half = f.modal[j], p.omega[j] * p.omega[j], 0.5 * p.decay[j]
         swing = math.sqrt(max(omega2 - half * half, 1e-12))
         left, c, s = math.exp(-half * h), math.cos(swing * h), math.sin(swing * h)
-        qq, qv = left * (c + half / swing * s), left * s / swing
-        vq, vv = -left * omega2 / swing * s, left * (c - half / swing * s)
-        put_weight(f, j, j, qq)
-        put_weight(f, j, m + j, qv)
-        put_weight(f, m + j, j, vq)
-        put_weight(f, m + j, m + j, vv)
-        still, moving = (1.0 - qq) / omega2, -vq / omega2
-        f.inputs[j], f.inputs[m + j] = still * f.swing[j], moving * f.swing[j]
-        for a in range(2):
-            motion = p.readings[2 + n + j, n + a]
-            for b in range(2):
-                put_weight(f, j, load + 2 * b + a, still * motion)
-                put_weight(f, m + j, load + 2 * b + a, moving * motion)
-            put_weight(f, j, load + 4 + a, 0.5 * h * still * motion)
-            put_weight(f, m + j, load + 4 + a, 0.5 * h * moving * motion)
-        for i in range(n):
-            push = -p.forces[2 + n + j, i] / omega2
-            put_weight(f, j, drive + 2 * n + i, still * push)
-            put_weight(f, m + j, drive + 2 * n + i, moving * push)
-    for a in range(2):
-        put_weight(f, load + a, load + a, (1.0 + h / FAST) * math.exp(-h / FAST))
-        put_weight(f, load + a, load + 4 + a, h * math.exp(-h / FAST))
-        put_weight(f, load + 4 + a, load + a, -h / (FAST * FAST) * math.exp(-h / FAST))
-        put_weight(f, load + 4 + a, load + 4 + a, (1.0 - h / FAST) * math.exp(-h / FAST))
-        put_weight(f, load + 2 + a, load + 2 + a, math.exp(-h / SLOW))
-    kept = math.exp(-h / DRIVE_TIME)
+        modal[QQ], modal[QV] = left * (c + half / swing * s), left * s / swing
+        modal[VQ], modal[VV] = -left * omega2 / swing * s, left * (c - half / swing * s)
+        modal[QF], modal[VF] = (1.0 - modal[QQ]) / omega2, -modal[VQ] / omega2
+        f.inputs[j], f.inputs[m + j] = modal[QF] * f.swing[j], modal[VF] * f.swing[j]
+    for i in range(zero):
+        f.turned[i, i] = 1.0
+    propagate(p, f, h, f.turned, whole(zero))
+    for i in range(zero):
+        for j in range(zero):
+            f.transition[j, i] = f.turned[i, j]
     for i in range(n):
-        put_weight(f, drive + i, drive + i, 1.0)
-        put_weight(f, drive + i, drive + n + i, h)
-        put_weight(f, drive + i, drive + 2 * n + i, 0.5 * h * h)
-        put_weight(f, drive + n + i, drive + n + i, 1.0)
-        put_weight(f, drive + n + i, drive + 2 * n + i, h)
-        put_weight(f, drive + 2 * n + i, drive + 2 * n + i, kept)
         f.variances[drive + i], f.variances[drive + 2 * n + i] = LEAK * h, f.jerk[i] * h
-    zero = zero_place(p)
     for a in range(2):
         f.variances[zero + a] = f.drift[a] * IMU_DRIFT * IMU_DRIFT * h
     turned = 0.0
@@ -100,26 +71,21 @@ def transit(p, f, k, size, h, loads, least2):
     The variances of the fast load are `loads` (2,) along x and y, or `least2` where they are less; N^2.
     """
     x, covariance, load, own = f.x[k], f.p[k], force_place(p), zero_place(p)
-    for i in range(own):
-        total = 0.0
-        for c in range(f.counts[i]):
-            total += f.weights[i, c] * x[f.places[i, c]]
-        f.row[i] = total
+    spread_of(x, f.transition, f.row, own)
     for i in range(own):
         x[i] = f.row[i]
     for i in range(2 * p.modes[0]):
         x[i] += f.inputs[i]
-    for i in range(own):
-        multiply_row(f, i, covariance, size, f.half[i])
+    propagate(p, f, h, covariance, whole(size))
     for i in range(own):
         for j in range(own):
-            f.turned[i, j] = f.half[j, i]
+            f.turned[i, j] = covariance[j, i]
         for j in range(own, size):
-            covariance[i, j] = covariance[j, i] = f.half[i, j]
-    for i in range(own):
-        multiply_row(f, i, f.turned, i + 1, covariance[i])
-        for j in range(i):
             covariance[j, i] = covariance[i, j]
+    propagate(p, f, h, f.turned, whole(own))
+    for i in range(own):
+        for j in range(i + 1):
+            covariance[i, j] = covariance[j, i] = f.turned[i, j]
     if size > own:
         drift_lags(p, x, covariance, size, h)
     for i in range(size):
@@ -151,22 +117,46 @@ def drift_lags(p, x, covariance, size, h):
                 covariance[j, lag] += h * covariance[j, lag + 1]
 
 
-@inner
-def multiply_row(f, i, right, size, found):
-    """Write row `i` of the product of the transition matrix and `right`, its first `size` entries, four terms at a time."""
-    for j in range(size):
-        found[j] = 0.0
-    count = f.counts[i]
-    for c in range(0, count - 3, 4):
-        one, two, three, four = f.weights[i, c], f.weights[i, c + 1], f.weights[i, c + 2], f.weights[i, c + 3]
-        first, second = right[f.places[i, c]], right[f.places[i, c + 1]]
-        third, fourth = right[f.places[i, c + 2]], right[f.places[i, c + 3]]
-        for j in range(size):
-            found[j] += one * first[j] + two * second[j] + three * third[j] + four * fourth[j]
-    for c in range(count - count % 4, count):
-        weight, line = f.weights[i, c], right[f.places[i, c]]
-        for j in range(size):
-            found[j] += weight * line[j]
+@kernel
+def propagate(p, f, h, lines, width):
+    """Replace the boom's rows of a matrix by their product with the transition matrix over `h` (s), `width` columns of it."""
+    n, m, load, drive = p.drives.shape[0], p.modes[0], force_place(p), drive_place(p)
+    along, up, force = f.rows[0], f.rows[1], f.rows[2]
+    for a in range(2):
+        mean, fast, slow, rate = f.rows[a], lines[load + a], lines[load + 2 + a], lines[load + 4 + a]
+        for k in range(width):
+            mean[k] = fast[k] + slow[k] + 0.5 * h * rate[k]
+    for j in range(m):
+        modal, omega2 = f.modal[j], p.omega[j] * p.omega[j]
+        x, y = p.readings[2 + n + j, n], p.readings[2 + n + j, n + 1]
+        for k in range(width):
+            force[k] = x * along[k] + y * up[k]
+        for i in range(n):
+            share, acceleration = p.forces[2 + n + j, i] / omega2, lines[drive + 2 * n + i]
+            for k in range(width):
+                force[k] -= share * acceleration[k]
+        qq, qv, vq, vv, qf, vf = modal[QQ], modal[QV], modal[VQ], modal[VV], modal[QF], modal[VF]
+        q, v = lines[j], lines[m + j]
+        for k in range(width):
+            before = q[k]
+            q[k] = qq * before + qv * v[k] + qf * force[k]
+            v[k] = vq * before + vv * v[k] + vf * force[k]
+    u, left, kept = h / FAST, math.exp(-h / FAST), math.exp(-h / SLOW)
+    ff, fr, rf, rr = (1.0 + u) * left, h * left, -u / FAST * left, (1.0 - u) * left
+    for a in range(2):
+        fast, slow, rate = lines[load + a], lines[load + 2 + a], lines[load + 4 + a]
+        for k in range(width):
+            before = fast[k]
+            fast[k] = ff * before + fr * rate[k]
+            rate[k] = rf * before + rr * rate[k]
+            slow[k] *= kept
+    kept = math.exp(-h / DRIVE_TIME)
+    for i in range(n):
+        drives, rate, acceleration = lines[drive + i], lines[drive + n + i], lines[drive + 2 * n + i]
+        for k in range(width):
+            drives[k] += h * rate[k] + 0.5 * h * h * acceleration[k]
+            rate[k] += h * acceleration[k]
+            acceleration[k] *= kept
 
 
 @inner
@@ -185,22 +175,64 @@ def free_sensors(p, f, covariance):
 
 
 @inner
-def correct(x, covariance, row, gain, innovation, variance, size):
+def correct(x, covariance, row, gains, innovation, variance, size):
     """Correct a state and its covariance by a reading; return the variance of the innovation."""
-    spread_of(row, covariance, gain, size)
-    expected = variance
-    for k in range(size):
-        expected += row[k] * gain[k]
-    take_innovation(x, covariance, gain, innovation, expected, size)
+    expected = variance + gain_after(covariance, row, gains, 0, size)
+    take_innovation(x, covariance, gains, 0, innovation, expected, size)
+    take_gains(covariance, gains, 1, size)
     return expected
 
 
 @inner
-def take_innovation(x, covariance, gain, innovation, expected, size):
-    """Correct a state and its covariance by an innovation of variance `expected`; `gain` is its covariance with the state."""
-    share = innovation / expected
+def gain_after(covariance, row, gains, count, size):
+    """Write gain `count`, the covariance of all states with the reading of `row`; return the variance of that reading.
+
+    The gains before are of readings that have corrected the state, but not yet the covariance.
+    """
+    gain = gains[count]
+    spread_of(row, covariance, gain, size)
+    for c in range(count):
+        subtract(gain, read(row, gains[c], size), gains[c], size)
+    return read(row, gain, size)
+
+
+@inner
+def subtract(gain, share, other, size):
+    """Subtract a share of another gain."""
+    for i in range(whole(size)):
+        gain[i] -= share * other[i]
+
+
+@inner
+def take_innovation(x, covariance, gains, count, innovation, expected, size):
+    """Correct a state by an innovation of variance `expected`, and divide its gain by the root; return how many gains are left.
+
+    Four gains correct the covariance.
+    """
+    gain, scale = gains[count], 1.0 / math.sqrt(expected)
+    for i in range(whole(size)):
+        gain[i] *= scale
     for i in range(size):
-        x[i] += gain[i] * share
-        part = gain[i] / expected
-        for k in range(size):
-            covariance[i, k] -= part * gain[k]
+        x[i] += gain[i] * (innovation * scale)
+    if count + 1 < GAINS:
+        return count + 1
+    take_gains(covariance, gains, GAINS, size)
+    return 0
+
+
+@kernel
+def take_gains(covariance, gains, count, size):
+    """Subtract g g^T of `count` gains g (4, s) from a covariance (s, s), two rows at a time."""
+    width = whole(size)
+    if count == 0:
+        return
+    for c in range(count, GAINS):
+        clear(gains[c], width)
+    first, second, third, fourth = gains[0], gains[1], gains[2], gains[3]
+    for i in range(0, size, 2):
+        line, below = covariance[i], covariance[i + 1]
+        a, b, c, d = first[i], second[i], third[i], fourth[i]
+        e, g, h, j = first[i + 1], second[i + 1], third[i + 1], fourth[i + 1]
+        for k in range(width):
+            line[k] -= a * first[k] + b * second[k] + c * third[k] + d * fourth[k]
+            below[k] -= e * first[k] + g * second[k] + h * third[k] + j * fourth[k]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner
-from .states import ALL_VALVES, BURST, OPEN, PREDICTION, VALVES
+from .states import ALL_VALVES, BURST, OPEN, PREDICTION, VALVES, whole
 
 MODELS = BURST + 1  # of a mixture
 LEAST_CHANCE = 1e-9
@@ -43,44 +43,70 @@ def interact(f, mixture, size, h):
     switch[OPEN, VALVES], switch[OPEN, OPEN], switch[OPEN, BURST] = closes, 1.0 - closes, 0.0
     switch[BURST, VALVES], switch[BURST, OPEN], switch[BURST, BURST] = stays, opens, 1.0 - stays - opens
     for target in range(MODELS):
-        new = 0.0
+        f.likely[target] = 0.0
         for source in range(MODELS):
-            new += f.chances[first + source] * switch[source, target]
-        f.likely[target] = new
+            f.likely[target] += f.chances[first + source] * switch[source, target]
         for source in range(MODELS):
-            f.shares[source] = f.chances[first + source] * switch[source, target] / new
-        blend(f, first, f.mixed_x[target], f.mixed_p[target], size)
+            f.shares[target, source] = f.chances[first + source] * switch[source, target] / f.likely[target]
+    two, three = apart(f, first, size)
+    one, other, last, shares, width = f.p[first], f.p[first + 1], f.p[first + 2], f.shares, whole(size)
+    for i in range(size):
+        by_one, by_two, by_three = one[i], other[i], last[i]
+        for k in range(width):
+            x, y, z = by_one[k], by_two[k], by_three[k]
+            by_one[k] = shares[0, 0] * x + shares[0, 1] * y + shares[0, 2] * z
+            by_two[k] = shares[1, 0] * x + shares[1, 1] * y + shares[1, 2] * z
+            by_three[k] = shares[2, 0] * x + shares[2, 1] * y + shares[2, 2] * z
     for target in range(MODELS):
         f.chances[first + target] = f.likely[target]
+        own, covariance = shares[target], f.p[first + target]
         for i in range(size):
-            f.x[first + target, i] = f.mixed_x[target, i]
-            for k in range(size):
-                f.p[first + target, i, k] = f.mixed_p[target, i, k]
+            to_two, to_three = between(own, two[i], three[i])
+            line = covariance[i]
+            for k in range(width):
+                line[k] += to_two * two[k] + to_three * three[k]
+    for i in range(size):
+        mean = f.x[first, i]
+        for target in range(MODELS):
+            f.x[first + target, i] = mean + shares[target, 1] * two[i] + shares[target, 2] * three[i]
 
 
 @inner
-def blend(f, first, mean, spread, size):
-    """Write mean and covariance of a mixture from its models with the probabilities `f.shares`."""
-    one, two, three = f.shares[0], f.shares[1], f.shares[2]
-    x, y, z = f.x[first], f.x[first + 1], f.x[first + 2]
-    for i in range(size):
-        mean[i] = one * x[i] + two * y[i] + three * z[i]
-    for i in range(size):
-        to_x, to_y, to_z = one * (x[i] - mean[i]), two * (y[i] - mean[i]), three * (z[i] - mean[i])
-        line, by_x, by_y, by_z = spread[i], f.p[first, i], f.p[first + 1, i], f.p[first + 2, i]
-        for k in range(size):
-            line[k] = one * by_x[k] + two * by_y[k] + to_x * (x[k] - mean[k]) + to_y * (y[k] - mean[k])
-        for k in range(size):
-            line[k] += three * by_z[k] + to_z * (z[k] - mean[k])
+def apart(f, first, size):
+    """Write the states of the second and of the third model of a mixture less that of the first; return these."""
+    two, three = f.rows[0], f.rows[1]
+    for i in range(whole(size)):
+        two[i], three[i] = f.x[first + 1, i] - f.x[first, i], f.x[first + 2, i] - f.x[first, i]
+    return two, three
+
+
+@inner
+def between(shares, two, three):
+    """Return the weights of both of `apart` in the row of the covariance among the models' means whose state they have there.
+
+    With d_0 = 0, the covariance sum w d d^T - (sum w d) (sum w d)^T has these rows.
+    """
+    return (
+        shares[1] * ((1.0 - shares[1]) * two - shares[2] * three),
+        shares[2] * ((1.0 - shares[2]) * three - shares[1] * two),
+    )
 
 
 @inner
 def mix(f, mixture, size):
     """Write mean and covariance of a mixture."""
-    first = first_model(mixture)
+    first, shares, mean, spread, width = first_model(mixture), f.shares[0], f.mean[mixture], f.spread[mixture], whole(size)
     for k in range(MODELS):
-        f.shares[k] = f.chances[first + k]
-    blend(f, first, f.mean[mixture], f.spread[mixture], size)
+        shares[k] = f.chances[first + k]
+    two, three = apart(f, first, size)
+    for i in range(size):
+        mean[i] = f.x[first, i] + shares[1] * two[i] + shares[2] * three[i]
+        to_two, to_three = between(shares, two[i], three[i])
+        line, by_one, by_two, by_three = spread[i], f.p[first, i], f.p[first + 1, i], f.p[first + 2, i]
+        for k in range(width):
+            line[k] = (
+                shares[0] * by_one[k] + shares[1] * by_two[k] + shares[2] * by_three[k] + to_two * two[k] + to_three * three[k]
+            )
 
 
 @inner

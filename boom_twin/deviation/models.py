@@ -29,10 +29,20 @@ import math
 
 from ..kernels.jit import inner, kernel
 from .channels import IMU_ZERO
-from .kalman import ANGLE_ZERO, FAST, correct, free_sensors, make_transition, transit
+from .kalman import (
+    ANGLE_ZERO,
+    FAST,
+    free_sensors,
+    gain_after,
+    make_transition,
+    subtract,
+    take_gains,
+    take_innovation,
+    transit,
+)
 from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
 from .mixture import MODELS, copy_model, first_model, interact, mix, weigh_models
-from .rows import SWAY_SHARE, clear, column_row, drive_row, read, variance_of
+from .rows import SWAY_SHARE, column_row, drive_row, read, variance_of
 from .states import (
     ALL_BURST,
     ALL_VALVES,
@@ -46,6 +56,7 @@ from .states import (
     all_states,
     drive_place,
     force_place,
+    whole,
     zero_place,
 )
 
@@ -116,16 +127,14 @@ def step_models(p, f, h, y):
         for mixture in range(mixtures):
             interact(f, mixture, states_of(p, mixture), h)
         make_transition(p, f, h / steps)
-        for _ in range(steps):
-            for mixture in range(mixtures):
-                first = first_model(mixture)
-                for k in range(first, first + MODELS):
-                    least2 = burst2 if k == first + BURST else 0.0
-                    transit(p, f, k, states_of(p, mixture), h / steps, f.load2[mixture], least2)
         for mixture in range(mixtures):
-            for model in (VALVES, BURST):
-                k = first_model(mixture) + model
-                hold_still(p, f, k, f.is_open[mixture], states_of(p, mixture))
+            first, states = first_model(mixture), states_of(p, mixture)
+            for k in range(first, first + MODELS):
+                least2 = burst2 if k == first + BURST else 0.0
+                for _ in range(steps):
+                    transit(p, f, k, states, h / steps, f.load2[mixture], least2)
+                if k != first + OPEN:
+                    hold_still(p, f, k, f.is_open[mixture], states)
     note_innovations(p, f, y)
     evidence = 0.0
     for mixture in range(mixtures):
@@ -155,30 +164,35 @@ def states_of(p, mixture):
 @inner
 def hold_still(p, f, k, is_open, size):
     """Correct model `k` by readings of zero rate and acceleration of drives behind closed valves."""
-    n, drive = p.drives.shape[0], drive_place(p)
+    n, drive, count, gains, width = p.drives.shape[0], drive_place(p), 0, f.gains[0], whole(size)
     for i in range(n):
         if is_open[i] == 0 and not f.deaf[i]:
             for order in (1, 2):
-                at = drive + order * n + i
-                clear(f.row, size)
-                f.row[at] = 1.0
+                at, gain = drive + order * n + i, gains[count]
+                for j in range(width):
+                    gain[j] = f.p[k, at, j]
+                for c in range(count):
+                    subtract(gain, gains[c, at], gains[c], size)
                 noise = CLOSED_RATE if order == 1 else CLOSED_ACCELERATION
-                correct(f.x[k], f.p[k], f.row, f.gain, -f.x[k, at], noise * noise, size)
+                expected = gain[at] + noise * noise
+                count = take_innovation(f.x[k], f.p[k], gains, count, -f.x[k, at], expected, size)
+    take_gains(f.p[k], gains, count, size)
 
 
 @inner
 def note_innovations(p, f, y):
-    """Write readings `y` less their mean predicted by the mixture, and the variances of the difference."""
+    """Write the rows of readings `y`, these less their mean predicted by the mixture, and the variances of the difference."""
     n = y.shape[0]
     size = zero_place(p) if p.reads_angle else drive_place(p) + n  # a length does not depend on the states behind
     for i in range(n):
-        mean = square = 0.0
-        first = drive_row(p, f, i, f.x[VALVES], f.row, size)
+        mean, square, row = 0.0, 0.0, f.driving[i]
+        reading, first = drive_row(p, f, i, f.x[VALVES], row, size), read(row, f.x[VALVES], size)
+        f.offsets[i] = reading - first
         for k in range(BURST + 1):
-            apart = drive_row(p, f, i, f.x[k], f.row, size) - first
+            apart = read(row, f.x[k], size) - first
             mean += f.chances[k] * apart
-            square += f.chances[k] * (apart * apart + variance_of(f.row, f.p[k], f.gain, size))
-        f.innovations[i, 0], f.innovations[i, 1] = y[i] - first - mean, square - mean * mean + drive_noise2(p, f, i)
+            square += f.chances[k] * (apart * apart + variance_of(row, f.p[k], f.gain, size))
+        f.innovations[i, 0], f.innovations[i, 1] = y[i] - reading - mean, square - mean * mean + drive_noise2(p, f, i)
 
 
 @inner
@@ -190,12 +204,14 @@ def drive_noise2(p, f, i):
 @inner
 def take_lengths(p, f, k, size, y):
     """Correct model `k` by readings `y` (n; NaN = missing); return their log likelihood."""
-    total = 0.0
+    total, count, gains = 0.0, 0, f.gains[0]
     for i in range(y.shape[0]):
         if math.isfinite(y[i]) and not f.deaf[i]:
-            innovation = y[i] - drive_row(p, f, i, f.x[k], f.row, size)
-            expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, drive_noise2(p, f, i), size)
+            innovation = y[i] - f.offsets[i] - read(f.driving[i], f.x[k], size)
+            expected = drive_noise2(p, f, i) + gain_after(f.p[k], f.driving[i], gains, count, size)
+            count = take_innovation(f.x[k], f.p[k], gains, count, innovation, expected, size)
             total -= 0.5 * (innovation * innovation / expected + math.log(expected))
+    take_gains(f.p[k], gains, count, size)
     return total
 
 

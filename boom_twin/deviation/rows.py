@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ..kernels.jit import inner
-from .states import all_states, drive_place, force_place, zero_place
+from ..kernels.jit import inner, kernel
+from .states import all_states, drive_place, force_place, whole, zero_place
 
 SWAY_SHARE = 0.3  # share of the error of an inclinometer by its acceleration that is not known
 SHAKEN_TIME = 0.5  # s, over which the mean square of a place's acceleration is taken
@@ -20,11 +20,16 @@ def clear(row, size):
 
 @inner
 def read(row, x, size):
-    """Return the reading of a row."""
-    total = 0.0
-    for k in range(size):
-        total += row[k] * x[k]
-    return total
+    """Return the reading of a row; four sums, because each waits for its last addition."""
+    one = two = three = four = 0.0
+    for k in range(0, size - 3, 4):
+        one += row[k] * x[k]
+        two += row[k + 1] * x[k + 1]
+        three += row[k + 2] * x[k + 2]
+        four += row[k + 3] * x[k + 3]
+    for k in range(size - size % 4, size):
+        one += row[k] * x[k]
+    return (one + two) + (three + four)
 
 
 @inner
@@ -52,15 +57,22 @@ def variance_of(row, covariance, gain, size):
     return max(read(row, gain, size), 0.0)
 
 
-@inner
+@kernel
 def spread_of(row, covariance, gain, size):
     """Write the covariance of all states with the reading of a row."""
-    clear(gain, size)
-    for k in range(size):
+    width = whole(size)
+    clear(gain, width)
+    for k in range(0, size - 3, 4):
+        one, two, three, four = row[k], row[k + 1], row[k + 2], row[k + 3]
+        if one != 0.0 or two != 0.0 or three != 0.0 or four != 0.0:
+            first, second, third, fourth = covariance[k], covariance[k + 1], covariance[k + 2], covariance[k + 3]
+            for i in range(width):
+                gain[i] += one * first[i] + two * second[i] + three * third[i] + four * fourth[i]
+    for k in range(size - size % 4, size):
         if row[k] != 0.0:
-            weight, line = row[k], covariance[k]
-            for i in range(size):
-                gain[i] += weight * line[i]
+            one, first = row[k], covariance[k]
+            for i in range(width):
+                gain[i] += one * first[i]
 
 
 @inner

@@ -7,10 +7,10 @@ import math
 from ..kernels.jit import inner, kernel
 from .channels import READS_ACCELERATION, READS_ANGLE, READS_COORDINATE, READS_RATE, TIP_IMU_STATES, measurement_row
 from .delayed import delayed_row, note_lateness
-from .kalman import ANGLE_ZERO, correct, take_innovation
+from .kalman import ANGLE_ZERO, correct, gain_after, take_gains, take_innovation
 from .learning import SURPRISE
-from .mixture import mix, weigh_models
-from .rows import SWAY_SHARE, clear, read, variance_of
+from .mixture import MODELS, mix, weigh_models
+from .rows import SWAY_SHARE, clear, difference, read, variance_of
 from .states import ALL_BURST, ALL_VALVES, ESTIMATE, FED, FED_STAMP, PREDICTION, all_states, zero_place
 
 INEXACT = 0.03  # error of the model's accelerations and rates of turn: share of their root mean square at the site
@@ -38,23 +38,24 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         Stamps of the sample, and of the newest lengths, ns.
     """
     age = (newest - stamp) * 1e-9  # s
-    last, usable, lag = first, False, p.channels[first].lag
+    last, errors, lag = first, 0, p.channels[first].lag
     while last < p.channels.shape[0] and p.channels[last].stream == stream:
-        usable |= math.isfinite(residuals[last - first]) and not f.masked[last]
+        if math.isfinite(residuals[last - first]) and not f.masked[last]:
+            errors = max(errors, p.channels[last].last + 1, lag + 2)
         last += 1
-    if not usable or age > OLDEST:
+    if errors == 0 or age > OLDEST:
         return
     patience = SLOW if p.channels[first].kind == READS_COORDINATE else 0
     f.status[FED], f.status[FED_STAMP] = 1, max(f.status[FED_STAMP], newest + patience)
     if age > 0.0:
         note_lateness(p, f, stream, first, last, age)
-    f.likely[ALL_VALVES:] = 0.0
+    admit_errors(p, f, errors)
+    f.likely[ALL_VALVES:], count = 0.0, 0
     for c in range(first, last):
         residual = residuals[c - first]
         if f.masked[c] or not math.isfinite(residual):
             continue
         channel, span, share = p.channels[c], 0.0, 0.0
-        admit_errors(p, f, max(channel.last, lag + 1) + 1)
         if age == 0.0:
             measurement_row(p, f, c, f.row)
             f.row[zero_place(p) + channel.zero] = 1.0
@@ -74,11 +75,13 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         variance += interpolation_variance(f.curves[c, 2], span, share, 1e-9 * (stamp - f.taken[stream]))
         if lag >= 0:
             variance += add_lag(p, f, lag, f.row, f.rows[2])
-        take_reading(p, f, c, residual, variance)
+        count = take_reading(p, f, c, count, residual, variance)
         if channel.kind == READS_ANGLE:
             f.apart[channel.index] += LEARN_RATIO * (residual - f.apart[channel.index])
             if f.deaf[channel.index]:
                 replace_length(p, f, c, residual)
+    for k in range(MODELS):
+        take_gains(f.p[ALL_VALVES + k], f.gains[k], count, all_states(p))
     f.taken[stream] = stamp
     weigh_models(f, ESTIMATE)
     mix(f, ESTIMATE, all_states(p))
@@ -121,11 +124,9 @@ def rate_of_row(p, f, row, rates):
     """Write the row of the rate of the reading of `row` at the newest instant."""
     size, h = zero_place(p), f.interval[1]
     clear(rates, all_states(p))
-    for i in range(size):
-        if row[i] != 0.0 and h > 0.0:
-            rates[i] -= row[i] / h
-            for c in range(f.counts[i]):
-                rates[f.places[i, c]] += row[i] / h * f.weights[i, c]
+    if h > 0.0:
+        for j in range(size):
+            rates[j] = (read(row, f.transition[j], size) - row[j]) / h
 
 
 @inner
@@ -165,27 +166,24 @@ def replace_length(p, f, c, residual):
     size = zero_place(p)
     measurement_row(p, f, c, f.row)
     for k in range(ALL_VALVES):
-        innovation = residual
-        for j in range(size):
-            innovation -= f.row[j] * (f.x[k, j] - f.mean[PREDICTION, j])
-        correct(f.x[k], f.p[k], f.row, f.gain, innovation, p.channels[c].noise2 + ANGLE_ZERO * ANGLE_ZERO, size)
+        innovation = residual - difference(f.row, f.x[k], f.mean[PREDICTION], size)
+        correct(f.x[k], f.p[k], f.row, f.gains[MODELS], innovation, p.channels[c].noise2 + ANGLE_ZERO * ANGLE_ZERO, size)
 
 
 @inner
-def take_reading(p, f, channel, residual, variance):
-    """Correct the estimate by a residual of the quantity in `f.row` of a measured channel.
+def take_reading(p, f, channel, count, residual, variance):
+    """Correct the estimate by a residual of the quantity in `f.row` of a measured channel; return how many gains are left.
 
     Its noise is learnt: innovations that are larger than expected raise it until they are as expected. The evidence
     scales innovations by their recent mean square: a model gains nothing by stating a smaller variance.
     """
     every = all_states(p)
     variance *= max(f.excess[channel], 1.0)
-    shown, likelihood, ratio = 0.0, 0.0, f.ratio[channel]
+    shown, likelihood, ratio, left = 0.0, 0.0, f.ratio[channel], 0
     for k in range(ALL_VALVES, ALL_BURST + 1):
-        innovation = residual
-        for i in range(every):
-            innovation -= f.row[i] * (f.x[k, i] - f.mean[PREDICTION, i])
-        own2 = variance_of(f.row, f.p[k], f.gain, every)
+        gains = f.gains[k - ALL_VALVES]
+        innovation = residual - difference(f.row, f.x[k], f.mean[PREDICTION], every)
+        own2 = max(gain_after(f.p[k], f.row, gains, count, every), 0.0)
         expected = variance + own2
         normalised2 = innovation * innovation / expected
         shown += f.chances[k] * normalised2
@@ -193,8 +191,9 @@ def take_reading(p, f, channel, residual, variance):
         likelihood += f.chances[k] / math.sqrt(ratio * expected * tail ** (DOF + 1.0))
         weight = min((DOF + 1.0) / (DOF + normalised2), 1.0)
         expected = variance / weight + own2
-        take_innovation(f.x[k], f.p[k], f.gain, innovation, expected, every)
+        left = take_innovation(f.x[k], f.p[k], gains, count, innovation, expected, every)
         f.likely[k] -= 0.5 * (innovation * innovation / expected + math.log(expected))
     f.evidence[0] += math.log(max(likelihood, 1e-300))
     f.ratio[channel] += LEARN_RATIO * (min(shown, SURPRISE * ratio) - ratio)
     f.excess[channel] = max(f.excess[channel] * (1.0 + LEARN_NOISE * (min(shown, SURPRISE) - 1.0)), 1.0)
+    return left

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -58,13 +59,15 @@ class Filters(NamedTuple):
     rates (rad/s) and angular accelerations (rad/s^2) of the chords behind them. swing : (m,) modal forces by these,
     inputs : (2 m,) changes of modal coordinates and rates in a step by them. sway2 : (n,) square of the largest angle by
     which an inclinometer lately erred, rad^2.
-    places, weights, counts : (p, k), (p, k), (p,) columns of the transition matrix by row. variances : (s,) of its noise.
+    modal, transition : (m, 6), (p, p) part of the modes in the transition matrix, and its transpose. variances : (s,) of its
+    noise.
     motion : (sites, 9) predicted x, y, angle of every site, m and rad, their rates, their accelerations.
     shaking : (sites, 2) mean squares of its acceleration, m^2/s^4, and of its rate of turn, rad^2/s^2. felt : (c,) specific
     force that channels of accelerometers read by that, m/s^2.
     strokes : (n, 3) predicted lengths (m), their rates and accelerations.
     innovations : (n, 2) newest lengths less what the prediction's mixture expected before them (m), and their variances.
     Where angles drive the model, length2, before, strokes and innovations are of angles, in rad.
+    driving, offsets : (n, s), (n,) rows of what drives the model, and its readings at a state of zeros.
     pulls : (n,) predicted forces, N. evidence : (1,) logarithm of the likelihood of all that was read, up to a constant.
     The others are scratch.
     """
@@ -100,19 +103,18 @@ class Filters(NamedTuple):
     copies: NDArray[np.int64]
     instants: NDArray[np.int64]
     noise: SensorNoise
-    places: NDArray[np.int64]
-    weights: Array
-    counts: NDArray[np.int64]
+    modal: Array
+    transition: Array
     variances: Array
     felt: Array
     pulls: Array
     evidence: Array
-    half: Array
     turned: Array
-    mixed_x: Array
-    mixed_p: Array
     row: Array
     gain: Array
+    gains: Array
+    driving: Array
+    offsets: Array
     rows: Array
     likely: Array
     switch: Array
@@ -127,10 +129,10 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
     """Return filters of a boom with so many joints, modes at most, and these measured channels."""
     n, channels, sites, behind = joints, len(measured.channels), len(measured.sites), 4 + 2 * joints + len(measured.errors)
     own = 2 * modes + LOADS + 3 * joints
-    states = own + behind + DELAYED
+    states = whole(own + behind + DELAYED)
     return Filters(
-        x=np.zeros((6, states)), p=np.zeros((6, states, states)), chances=np.zeros(6), mean=np.zeros((2, states)),
-        spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros((2, n), np.int64),
+        x=np.zeros((6, states)), p=vectors(6, states, states), chances=np.zeros(6), mean=np.zeros((2, states)),
+        spread=vectors(2, states, states), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros((2, n), np.int64),
         still=np.zeros((2, n)), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
@@ -138,14 +140,21 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         sway2=np.zeros(n), apart=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,
         late=np.zeros(len(Stream)), taken=np.zeros(len(Stream), np.int64), curves=np.zeros((channels, 3)),
         copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
-        places=np.zeros((own, 8 + n), np.int64), weights=np.zeros((own, 8 + n)), counts=np.zeros(own, np.int64),
+        modal=np.zeros((modes, 6)), transition=vectors(own, whole(own)), turned=vectors(own, whole(own)),
         variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
-        half=np.zeros((own, states)), turned=np.zeros((own, own)), mixed_x=np.zeros((3, states)),
-        mixed_p=np.zeros((3, states, states)),
-        row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((9, states)), likely=np.zeros(6),
-        switch=np.zeros((3, 3)), shares=np.zeros(3), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),
+        row=vectors(states), gain=vectors(states), gains=vectors(4, 4, states), driving=vectors(n, states), offsets=np.zeros(n),
+        rows=vectors(9, states), likely=np.zeros(6),
+        switch=np.zeros((3, 3)), shares=np.zeros((3, 3)), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),
         strokes=np.zeros((n, 3)), innovations=np.zeros((n, 2)),
     )  # fmt: skip
+
+
+def vectors(*shape: int) -> Array:
+    """Return zeros at an address from which the processor loads whole vectors fastest; so do rows of a `whole` length."""
+    count = math.prod(shape)
+    room = np.zeros(count + 8)
+    first = -room.ctypes.data // 8 % 8
+    return room[first : first + count].reshape(shape)
 
 
 @inner
@@ -179,3 +188,9 @@ def copy_place(p):
 def all_states(p):
     """Return the number of states of the estimate."""
     return copy_place(p) + p.delayed[0]
+
+
+@inner
+def whole(size):
+    """Return `size` rounded up to whole vectors of the processor; numbers behind `size` in a row are of no account."""
+    return (size + 7) & -8

@@ -59,7 +59,7 @@ def test_late_readings_give_the_estimate_of_all_readings_in_their_order() -> Non
     noise = f.p[ALL_VALVES, :size, :size].copy()
     f.x[ALL_VALVES, :size], f.p[ALL_VALVES, :size, :size] = x, covariance
 
-    steps, gain = 60, np.zeros(f.x.shape[1])
+    steps, gains = 60, f.gains[0]
     values = rows[:, :size] @ x + rng.normal(size=(steps, len(rows))) * 5.0 * np.sqrt(variances)
     for k in range(steps):
         x, covariance = transition @ x, transition @ covariance @ transition.T + noise
@@ -70,7 +70,7 @@ def test_late_readings_give_the_estimate_of_all_readings_in_their_order() -> Non
         transit(p, f, ALL_VALVES, all_states(p), h, LOADS, 0.0)
         for j in range(N):
             innovation = values[k, j] - rows[j] @ f.x[ALL_VALVES]
-            correct(f.x[ALL_VALVES], f.p[ALL_VALVES], rows[j], gain, innovation, variances[j], all_states(p))
+            correct(f.x[ALL_VALVES], f.p[ALL_VALVES], rows[j], gains, innovation, variances[j], all_states(p))
         first = begin_instant(p, f, k * STEP)
         for j, c in enumerate(late, start=N):
             f.row[:] = rows[j]
@@ -79,7 +79,7 @@ def test_late_readings_give_the_estimate_of_all_readings_in_their_order() -> Non
             if k >= LATE:
                 assert delayed_row(p, f, c, (k - LATE) * STEP, f.row, f.rows[2])[0] > 0.0
                 innovation = values[k - LATE, j] - f.row @ f.x[ALL_VALVES]
-                correct(f.x[ALL_VALVES], f.p[ALL_VALVES], f.row, gain, innovation, variances[j], all_states(p))
+                correct(f.x[ALL_VALVES], f.p[ALL_VALVES], f.row, gains, innovation, variances[j], all_states(p))
     sigmas = np.sqrt(covariance.diagonal())
     known = sigmas > 0.0
     assert ((f.x[ALL_VALVES, :size] - x) / sigmas)[known] == pytest.approx(np.zeros(known.sum()), abs=1e-6)

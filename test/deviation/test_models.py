@@ -57,10 +57,7 @@ def test_transition_is_that_of_the_continuous_system_with_inputs_held(boom: Boom
 def transition_of(p: Posture, f: Filters, size: int) -> Array:
     """The first `size` rows and columns of the transition matrix as a full one; sensors' errors and copies stay."""
     found, own = np.eye(size), zero_place.py_func(p)
-    found[:own] = 0.0
-    for row in range(own):
-        for k in range(int(f.counts[row])):
-            found[row, f.places[row, k]] += f.weights[row, k]
+    found[:own, :own] = f.transition[:own, :own].T
     return found
 
 
@@ -86,14 +83,14 @@ def test_covariance_is_propagated_by_the_full_transition_matrix_and_lags_drift()
 
 def test_reading_is_taken_as_the_textbook_has_it() -> None:
     rng = np.random.default_rng(1)
-    root, row, x = rng.normal(size=(6, 6)), rng.normal(size=6), rng.normal(size=6)
+    root, row, x = rng.normal(size=(8, 8)), rng.normal(size=8), rng.normal(size=8)
     covariance, variance, innovation = root @ root.T, 0.3, 0.7
     s = row @ covariance @ row + variance
     gain = covariance @ row / s
-    left = np.eye(6) - np.outer(gain, row)
+    left = np.eye(8) - np.outer(gain, row)
     joseph = left @ covariance @ left.T + variance * np.outer(gain, gain)
     state, found = x.copy(), covariance.copy()
-    assert correct.py_func(state, found, row, np.zeros(6), innovation, variance, 6) == pytest.approx(s)
+    assert correct.py_func(state, found, row, np.zeros((4, 8)), innovation, variance, 8) == pytest.approx(s)
     assert state == pytest.approx(x + gain * innovation)
     assert found == pytest.approx(joseph)
 
