@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..bag.reader import Session, read, read_blocks
-from ..bag.session_file import PARSE_ERRORS, WHOLE, SessionBlocks, TimeWindow
+from ..bag.session_file import WHOLE, SessionBlocks, TimeWindow
 from ..bag.writer import RESULT_CHUNK_SIZE, MessageWriter
 from ..config.settings import Settings
 from ..messages.cdr_decoder import CdrDecoder, MessageBlock, stamp_in
@@ -129,7 +129,7 @@ class SessionSamples:
         single = list[tuple[int, Sample]]()
         for row in np.sort(np.concatenate(irregular)).tolist() if irregular else ():
             source = int(part.sources[row])
-            stamp, message = _read(blocks, part, row, wires[source])
+            stamp, message = blocks.read(wires[source], part, row)
             single += [(row, each) for each in self._decoder.samples(streams[source], stamp, message)]
         self._keep(single, regular)
 
@@ -171,19 +171,11 @@ def decoded(blocks: SessionBlocks, streams: list[list[Stream]]) -> Iterator[tupl
     wires = [_decoder(group) for group in streams]
     for block in blocks:
         for row, source in enumerate(block.sources.tolist()):
-            yield source, *_read(blocks, block, row, wires[source])
+            yield source, *blocks.read(wires[source], block, row)
 
 
 def _decoder(streams: list[Stream]) -> CdrDecoder:
     return CdrDecoder(TYPES[streams[0]], decode, SENSORS[streams[0]].field)
-
-
-def _read(blocks: SessionBlocks, block: MessageBlock, row: int, wire: CdrDecoder) -> tuple[int, Any]:
-    try:
-        return wire.read(block.data(row))
-    except PARSE_ERRORS:
-        blocks.decoded(block, row)  # raises it with its place
-        raise
 
 
 ITEMS_AHEAD = 8  # blocks of samples, or of reports, that wait between two threads
