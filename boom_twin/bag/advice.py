@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
+
+import numpy as np
 
 from ..errors import BagError
 from ..messages.cdr_decoder import CdrDecoder
@@ -231,16 +233,18 @@ def _names_read(session: Session, topics: Topics, joints: int) -> dict[Stream, d
     drive = topics.stroke_reading.stream
     needed = {sensor.name for sensor in topics.sensors_of(drive, joints).values()}
     blocks = read_blocks(session, {name: topics.inputs[streams[0]].type for name, streams in present.items()})
-    sources = [(present[source.name], CdrDecoder(source.type)) for source in blocks.sources]
+    decoders = [CdrDecoder(source.type) for source in blocks.sources]
     first: int | None = None
     for block in blocks:
-        for row, (source, log) in enumerate(zip(block.sources.tolist(), block.log_times.tolist(), strict=True)):
-            streams, decoder = sources[source]
-            names = blocks.read(decoder, block, row)[1].name[:MOST_NAMES]
-            first = log if first is None else first
-            for stream in streams:
+        first = int(block.log_times[0]) if first is None else first
+        for source in sorted(set(block.sources.tolist())):
+            part = block.chosen(np.flatnonzero(block.sources == source))
+            messages = [blocks.read(decoders[source], part, 0)[1]]
+            if decoders[source].read_many(part) is None:  # not all have the names of the first one
+                messages += [blocks.read(decoders[source], part, row)[1] for row in range(1, len(part))]
+            for stream, message in product(present[blocks.sources[source].name], messages):
                 if len(found[stream]) < MOST_NAMES:
-                    found[stream].update(dict.fromkeys(names))
-            if log - first > 5 * SECOND and needed <= found.get(drive, {}).keys():
-                return found
+                    found[stream].update(dict.fromkeys(message.name[:MOST_NAMES]))
+        if block.log_times[-1] - first > 5 * SECOND and needed <= found.get(drive, {}).keys():
+            break
     return found
