@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import Any
-
-import numpy as np
 
 from ..errors import BagError
 from ..messages.cdr_decoder import CdrDecoder
@@ -237,12 +235,8 @@ def _names_read(session: Session, topics: Topics, joints: int) -> dict[Stream, d
     first: int | None = None
     for block in blocks:
         first = int(block.log_times[0]) if first is None else first
-        for source in sorted(set(block.sources.tolist())):
-            part = block.chosen(np.flatnonzero(block.sources == source))
-            messages = [blocks.read(decoders[source], part, 0)[1]]
-            if decoders[source].read_many(part) is None:  # not all have the names of the first one
-                messages += [blocks.read(decoders[source], part, row)[1] for row in range(1, len(part))]
-            for stream, message in product(present[blocks.sources[source].name], messages):
+        for source, _, message in blocks.read_together(decoders, block):
+            for stream in present[blocks.sources[source].name]:
                 if len(found[stream]) < MOST_NAMES:
                     found[stream].update(dict.fromkeys(message.name[:MOST_NAMES]))
         if block.log_times[-1] - first > 5 * SECOND and needed <= found.get(drive, {}).keys():

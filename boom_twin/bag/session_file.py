@@ -291,6 +291,22 @@ class SessionBlocks:
             self.decoded(block, row)  # raises it with its place
             raise
 
+    def read_together(self, decoders: Sequence[CdrDecoder], block: MessageBlock) -> Iterator[tuple[int, Integers, Any]]:
+        """Yield source, stamps (k,) and message, by `decoders` of the sources, for all messages of a block.
+
+        Messages of a source with one layout come as one message, whose numbers are arrays (k,).
+        """
+        for source in sorted(set(block.sources.tolist())):
+            part, decoder = block.chosen(np.flatnonzero(block.sources == source)), decoders[source]
+            stamp, message = self.read(decoder, part, 0)  # a layout is known with its first message
+            if (many := decoder.read_many(part)) is not None:
+                yield source, *many
+                continue
+            yield source, np.array([stamp]), message
+            for row in range(1, len(part)):
+                stamp, message = self.read(decoder, part, row)
+                yield source, np.array([stamp]), message
+
 
 def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahead: int) -> Iterator[MessageBlock]:
     """Yield blocks of the requested channels of one file (number 0 or more), `ahead` ns later."""

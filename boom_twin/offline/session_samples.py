@@ -9,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from itertools import repeat
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -98,7 +98,7 @@ class SessionSamples:
         types = {name: self._topics.inputs[heard[name][0]].type for name in self._wanted}
         blocks, count = read_blocks(session, types, self._window), 0
         streams, drive = [heard[source.name] for source in blocks.sources], self._topics.stroke_reading.stream
-        wires = [_decoder(group) for group in streams]
+        wires = [decoder_of(group) for group in streams]
         for block in blocks:
             first = 0
             while first < len(block):
@@ -163,18 +163,7 @@ class SessionSamples:
                 yield item
 
 
-def decoded(blocks: SessionBlocks, streams: list[list[Stream]]) -> Iterator[tuple[int, int, Any]]:
-    """Yield source, stamp (ns) and message for each message, with the fields that `CdrDecoder` reads for each source's streams.
-
-    Raise BagError if a message cannot be decoded.
-    """
-    wires = [_decoder(group) for group in streams]
-    for block in blocks:
-        for row, source in enumerate(block.sources.tolist()):
-            yield source, *blocks.read(wires[source], block, row)
-
-
-def _decoder(streams: list[Stream]) -> CdrDecoder:
+def decoder_of(streams: list[Stream]) -> CdrDecoder:
     return CdrDecoder(TYPES[streams[0]], decode, SENSORS[streams[0]].field)
 
 
