@@ -40,7 +40,7 @@ $(BIN)/python:
 
 # What a demonstration needs; tests, studies and docs need more.
 $(DEMO_READY): setup.py | $(BIN)/python
-	@echo "installing what the twin, ROS 2 and the live page need into $(VENV): 155 packages, 800 MB, about a minute .." >&2
+	@echo "installing what the twin, ROS 2 and the live page need into $(VENV): 154 packages, 800 MB, about a minute .." >&2
 	$(BIN)/python -m pip install --quiet --editable ".[ros,monitor]"
 	@touch $@
 

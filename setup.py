@@ -50,8 +50,6 @@ setup(
         "zstandard>=0.22,<1",
         "lz4>=4.3.3,<5",
         "matplotlib>=3.9.1,<4",
-        "tqdm>=4.66.3,<5",
-        "pint>=0.24,<1",
         "jinja2>=3.1.6,<4",
     ],
     extras_require={

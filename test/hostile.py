@@ -6,7 +6,7 @@ from pathlib import Path
 
 NAMES = (
     *("boom_twin", "numpy", "mcap", "rosbags", "zstandard", "lz4", "ruamel", "pydantic", "numba", "scipy", "matplotlib"),
-    *("aiohttp", "tqdm", "rclpy", "sensor_msgs", "diagnostic_msgs", "geometry_msgs", "rcl_interfaces", "lark", "yaml"),
+    *("aiohttp", "rclpy", "sensor_msgs", "diagnostic_msgs", "geometry_msgs", "rcl_interfaces", "lark", "yaml"),
     *("sitecustomize", "usercustomize", "runpy", "pickle", "struct", "typing", "argparse", "subprocess", "signal", "json"),
 )
 

@@ -9,12 +9,13 @@ from itertools import pairwise
 from typing import Any
 
 from ..errors import BagError
+from ..messages.cdr_decoder import CdrDecoder
 from ..messages.sample_decoder import MOST_NAMES
 from ..messages.topic_table import Qos, Topic, Topics
 from ..types import SECOND, SENSORS, Stream
 from .inspect import BagInfo, Tally
 from .metadata import profiles
-from .reader import Session, TopicInfo, check_topic, read, readable
+from .reader import Session, TopicInfo, check_topic, read_blocks, readable
 from .session_file import CDR
 from .session_model import mapping_of
 
@@ -229,12 +230,15 @@ def _names_read(session: Session, topics: Topics, joints: int) -> dict[Stream, d
     found: dict[Stream, dict[str, None]] = {stream: {} for streams in present.values() for stream in streams}
     drive = topics.stroke_reading.stream
     needed = {sensor.name for sensor in topics.sensors_of(drive, joints).values()}
+    blocks = read_blocks(session, {name: topics.inputs[streams[0]].type for name, streams in present.items()})
+    decoders = [CdrDecoder(source.type) for source in blocks.sources]
     first: int | None = None
-    for name, log, message in read(session, {name: topics.inputs[streams[0]].type for name, streams in present.items()}):
-        first = log if first is None else first
-        for stream in present[name]:
-            if len(found[stream]) < MOST_NAMES:
-                found[stream].update(dict.fromkeys(message.name[:MOST_NAMES]))
-        if log - first > 5 * SECOND and needed <= found.get(drive, {}).keys():
+    for block in blocks:
+        first = int(block.log_times[0]) if first is None else first
+        for source, _, message in blocks.read_together(decoders, block):
+            for stream in present[blocks.sources[source].name]:
+                if len(found[stream]) < MOST_NAMES:
+                    found[stream].update(dict.fromkeys(message.name[:MOST_NAMES]))
+        if block.log_times[-1] - first > 5 * SECOND and needed <= found.get(drive, {}).keys():
             break
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Set
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from io import BytesIO
 from itertools import pairwise
 from operator import attrgetter
@@ -50,7 +51,7 @@ _HEAD = np.dtype([("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("
 _MESSAGE = int(Opcode.MESSAGE)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class McapFile(SessionFile):
     """Content of one .mcap file."""
 
@@ -65,8 +66,9 @@ class McapFile(SessionFile):
                 for row, (channel, time) in enumerate(zip(block.sources.tolist(), block.log_times.tolist(), strict=True)):
                     yield channel, time, block.data(row)
 
+    @cached_property
     def log_clock(self) -> LogClock:
-        """Return the clock as in `SessionFile`, from the index of the messages; without one, from the messages."""
+        """Clock as in `SessionFile`, from the index of the messages; without one, from the messages."""
         with as_bag_error(self.path), open_received(self.path) as file:
             return LogClock.of((_log_times(file, piece) for piece in self.pieces), self.counts)
 

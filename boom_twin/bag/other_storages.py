@@ -8,6 +8,7 @@ from bz2 import BZ2Decompressor
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -33,12 +34,13 @@ _TOGETHER = 100_000  # messages whose times are read at once
 _REMEDY = "The file is damaged or no rosbag2 storage: try `sqlite3 FILE .recover` on a copy, or another copy of the session."
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SqliteFile(SessionFile):
     """Content of one .db3 file, which has no checksums."""
 
+    @cached_property
     def log_clock(self) -> LogClock:
-        """Return the clock as in `SessionFile`, by the order in which the messages were stored."""
+        """Clock as in `SessionFile`, by the order in which the messages were stored."""
         with _database(self.path) as database:
             rows = database.execute(_TIMES)
             pieces = (np.array(piece).T for piece in iter(lambda: rows.fetchmany(_TOGETHER), []))

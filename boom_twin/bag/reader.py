@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import lru_cache
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
@@ -134,11 +135,16 @@ def _parsed(place: str, schema: Schema, kind: str) -> Typesdict:
     if schema.encoding not in _PARSERS:
         encodings = " and ".join(_PARSERS)
         raise BagError(f"{place}: schema encoding {schema.encoding!r}: only {encodings} are read. Record with ROS 2.")
-    text = re.sub(r"\r\n?", "\n", schema.data.decode("utf-8-sig", "replace"))
     try:
-        return _PARSERS[schema.encoding](_SEPARATOR.sub("=" * 80, text), kind)
+        return _types_in(schema.encoding, schema.data, kind)
     except TypesysError as error:
         raise BagError(f"{place}: its definition cannot be parsed ({error}). Record the session again.") from error
+
+
+@lru_cache(100)  # each reader of a session asks for the same few
+def _types_in(encoding: str, data: bytes, kind: str) -> Typesdict:
+    text = re.sub(r"\r\n?", "\n", data.decode("utf-8-sig", "replace"))
+    return _PARSERS[encoding](_SEPARATOR.sub("=" * 80, text), kind)
 
 
 RECOVERED = "recovered from"  # key of the note on a session that was recovered from a damaged one

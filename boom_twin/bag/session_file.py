@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import accumulate, islice
 from numbers import Real
 from pathlib import Path
@@ -23,7 +24,7 @@ from rosbags.serde import SerdeError
 from zstandard import ZstdError
 
 from ..errors import BagError, UsageError
-from ..messages.cdr_decoder import Integers, MessageBlock, by_log_time, joined
+from ..messages.cdr_decoder import CdrDecoder, Integers, MessageBlock, by_log_time, joined
 from ..messages.type_store import decode, jazzy
 from ..types import NANO
 
@@ -152,7 +153,7 @@ class LogClock(NamedTuple):
         return clock if 2 * agreed > sum(counts.values()) else cls([], [0])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class SessionFile(ABC):
     """Content of one file of a session."""
 
@@ -190,8 +191,9 @@ class SessionFile(ABC):
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield channel, log time (ns) and encoded data of all messages."""
 
+    @cached_property
     def log_clock(self) -> LogClock:
-        """Return the clock of log times. The default is for a storage whose order is that of log times."""
+        """Clock of log times. The default is for a storage whose order is that of log times."""
         return LogClock([], [0])
 
     def heads_by(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
@@ -267,7 +269,7 @@ class SessionBlocks:
         return numbers
 
     def __iter__(self) -> Iterator[MessageBlock]:
-        clocks = [file.log_clock() for file, _ in self._files]
+        clocks = [file.log_clock for file, _ in self._files]
         ahead = accumulate((clock.shifts[-1] for clock in clocks), initial=0)  # a clock set back stays so in later files
         blocks = _merged([_wanted(*file, clock, late) for file, clock, late in zip(self._files, clocks, ahead, strict=False)])
         return blocks if self._window == WHOLE else self._window.cut(blocks, self._files[0][0].path)
@@ -280,6 +282,30 @@ class SessionBlocks:
         except PARSE_ERRORS as error:
             place = f"{source.file}: topic {source.topic} at log time {block.log_times[row]} ns"
             raise BagError(f"{place}: {error} {REMEDY}") from error
+
+    def read(self, decoder: CdrDecoder, block: MessageBlock, row: int) -> tuple[int, Any]:
+        """Return stamp and fields of one message, see `CdrDecoder.read`. Raise BagError if it cannot be decoded."""
+        try:
+            return decoder.read(block.data(row))
+        except PARSE_ERRORS:
+            self.decoded(block, row)  # raises it with its place
+            raise
+
+    def read_together(self, decoders: Sequence[CdrDecoder], block: MessageBlock) -> Iterator[tuple[int, Integers, Any]]:
+        """Yield source, stamps (k,) and message, by `decoders` of the sources, for all messages of a block.
+
+        Messages of a source with one layout come as one message, whose numbers are arrays (k,).
+        """
+        for source in sorted(set(block.sources.tolist())):
+            part, decoder = block.chosen(np.flatnonzero(block.sources == source)), decoders[source]
+            stamp, message = self.read(decoder, part, 0)  # a layout is known with its first message
+            if (many := decoder.read_many(part)) is not None:
+                yield source, *many
+                continue
+            yield source, np.array([stamp]), message
+            for row in range(1, len(part)):
+                stamp, message = self.read(decoder, part, row)
+                yield source, np.array([stamp]), message
 
 
 def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahead: int) -> Iterator[MessageBlock]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import BagError, UsageError
-from ..offline.progress import progress_of
+from ..offline.progress import ProgressLine
 from .arguments import add_session, at_least, positive, window_of
 from .output import tell, warn
 
@@ -62,7 +62,7 @@ def run(args: Namespace) -> int:
                 dashboard = f"; dashboard: {workers.dashboard}" if workers.dashboard else ""
                 tell(f"{len(done)} of {len(tasks)} sessions are done{dashboard}")
                 try:
-                    with closing(progress_of(len(tasks), "sessions", "batch", len(done))) as progress:
+                    with closing(ProgressLine(len(tasks), "sessions", "batch", len(done))) as progress:
                         for row in rows_of(workers, waiting):
                             folder.keep(row)
                             done[row["key"]] = row

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..errors import BoomTwinError, UsageError
-from ..offline.progress import progress_of
+from ..offline.progress import ProgressLine
 from .arguments import add_json, add_session, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, warn, warn_incomplete
 
@@ -51,7 +51,7 @@ def run(args: Namespace) -> int:
     names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
     choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
     began = time.perf_counter()
-    with closing(progress_of(100, "%", "calibrate")) as bar:
+    with closing(ProgressLine(100, "%", "calibrate")) as bar:
         found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, _moving(bar), window_of(args))
     wall = time.perf_counter() - began
     credit = f"{args.date or time.strftime('%Y-%m-%d')} by boom_twin {__version__}"

@@ -53,13 +53,13 @@ def run(args: Namespace) -> int:
 def _examined(scene: Scene, folder: Path | None) -> tuple[dict[str, Any], list[str]]:
     """Compute the envelope; return the values of ``--json`` and the lines of text; write files into `folder`, if given."""
     from ..analysis.envelope import envelope
-    from ..offline.progress import progress_of
+    from ..offline.progress import ProgressLine
 
     bars: list[ProgressBar] = []
 
     def progress(done: int, total: int) -> None:
         if done == 1:
-            bars.append(progress_of(total, "extremes" if bars else "postures", "envelope"))
+            bars.append(ProgressLine(total, "extremes" if bars else "postures", "envelope"))
         bars[-1].update(1)
         if done == total:
             bars[-1].close()

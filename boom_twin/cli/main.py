@@ -144,7 +144,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code; without `argv` that of the process, which has nothing else to do."""
     # New objects between two searches for garbage. Modules hold none, and looking through those of numba again and again takes
     # 0.05 s, once more at the exit 0.09 s: hence also gc.freeze().
-    collect_after = 100_000
+    collect_after = 300_000
     if argv is not None:
         return _main(argv)
     open_closed_streams()

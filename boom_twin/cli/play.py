@@ -8,14 +8,14 @@ import sys
 import termios
 import tty
 from argparse import ArgumentParser, Namespace
+from contextlib import closing
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from tqdm import tqdm
-
 from ..bag.reader import scan
 from ..errors import BoomTwinError
+from ..offline.progress import ProgressLine
 from ..ros.startup import require_rclpy
 from ..types import NANO
 from .arguments import add_ros_args, not_negative, positive, ros_arguments
@@ -23,9 +23,6 @@ from .output import tell, warn
 
 if TYPE_CHECKING:
     from ..ros.bag.player import Player
-
-
-BAR = "{l_bar}{bar}| {n:.1f}/{total:.1f} s"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -89,10 +86,11 @@ def _play(player: Player, args: Namespace, length: float) -> None:
         return is_paused
 
     def show(word: str) -> None:
-        if bar.disable:  # no terminal
-            tell(f"{word}, {bar.n:.1f} of {length:.1f} s")
+        if line.is_shown:
+            line.name = word
+            line.show()
         else:
-            bar.set_description(word, refresh=True)
+            tell(f"{word}, {line.done:.1f} of {length:.1f} s")
 
     with Keys() as keys:
         if keys.are_read:
@@ -100,9 +98,9 @@ def _play(player: Player, args: Namespace, length: float) -> None:
         if not sys.stderr.isatty():
             tell(f"playing {length:.1f} s")
         while True:
-            with tqdm(total=length, disable=None, ncols=80, mininterval=0.5, bar_format=BAR, desc="playing") as bar:
+            with closing(ProgressLine(length, "s", "playing")) as line:
                 for elapsed in player.play(args.rate, args.start, args.duration, is_held):
-                    bar.update(elapsed * NANO - bar.n)
+                    line.update(elapsed * NANO - line.done)
             if not args.loop:
                 return
 

@@ -8,7 +8,7 @@ from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..offline.progress import progress_of
+from ..offline.progress import ProgressLine
 from ..types import StrokeReading
 from .arguments import SESSION, add_json, add_namespace, add_session, files_of, refuse_given, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell, warn_incomplete
@@ -71,7 +71,7 @@ def run(args: Namespace) -> int:
             tables[0][1].add(stretch)
 
         options = ReplayOptions(
-            progress=partial(progress_of, unit="messages", name="replay"),
+            progress=partial(ProgressLine, unit="messages", name="replay"),
             mapping=args.mapping,
             changes=not args.no_changes,
             health=not args.no_health,

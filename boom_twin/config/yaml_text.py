@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import lru_cache
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -59,6 +61,11 @@ def plain(text: str) -> Any:
         It is not YAML; it has a value with a tag, a merge key, or a key twice; it holds more than `MOST_VALUES` values, or is
         nested deeper than `DEEPEST`.
     """
+    return deepcopy(_plain(text))
+
+
+@lru_cache(4)  # several readers of a session look into its metadata
+def _plain(text: str) -> Any:
     try:
         reader = YamlReader(text, list)
     except RecursionError:

@@ -154,11 +154,10 @@ class KernelCache:
         from numba import __version__
         from numba.core.codegen import CPUCodeLibrary, JitEngine
         from numba.core.compiler import CompileResult
-        from numba.core.runtime import rtsys
         from numba.core.serialize import dumps
 
         self._rebuild, self._reduce = CompileResult._rebuild, CompileResult._reduce
-        self._initialize, self._dumps = rtsys.initialize, dumps
+        self._dumps = dumps
         _ = CPUCodeLibrary._get_module_for_linking, JitEngine.is_symbol_defined  # what loading stands in for
         self._name, self._folder = f"{function.__module__}.{function.__qualname__}", folder
         self._version = (__version__, sys.implementation.cache_tag, function.__code__.co_code)
@@ -170,7 +169,6 @@ class KernelCache:
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """The compiled kernel for a signature; None if it is not there, or not as it was written."""
-        self._initialize(context)  # the symbols that loaded code refers to
         data = read_checked(self._path(signature, context.codegen()))
         if data is None:
             return None
@@ -241,6 +239,7 @@ def _is_there(callee: Any, engine: Any) -> bool:
     return bool(engine.is_symbol_defined(callee.symbol))
 
 
+@cache
 def _nothing(codegen: Any) -> bytes:
     """Intermediate code without any function, as what stands for that of a kernel until it is needed."""
     return bytes(codegen.create_library("nothing")._final_module.as_bitcode())

@@ -16,6 +16,7 @@ from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import SessionScene, kept, mapping_of, scene_of, settings_of, strokes_of
 from ..config.yaml_text import plain, read_plain
 from ..errors import BagError, UsageError
+from ..messages.cdr_decoder import Integers
 from ..messages.mapping import NO_LAG, mapping_from
 from ..messages.topic_table import Sensor, Topics, usual
 from ..scene.edit import loaded
@@ -25,7 +26,7 @@ from ..twin.twin import Twin
 from ..types import SENSORS, Array, Place, Stream, StrokeReading
 from ..wiring.check import STROKES_ALONE, Checked, Verdict, check, finding
 from ..wiring.readings import Channel, Lag, RestModel, Series, Window, is_checked, lag_of
-from .session_samples import SessionSamples, decoded
+from .session_samples import SessionSamples, decoder_of
 
 LOOK = 60.0  # s of a session that `wiring_of` reads
 AXES = "x", "y", "z"
@@ -205,16 +206,17 @@ def readings_of(session: Session, topics: Topics, joints: int, window: TimeWindo
     """
     heard = {name: streams for name, streams in topics.heard.items() if (topic := session.find(name)) and topic.count}
     types = {name: topics.inputs[streams[0]].type for name, streams in heard.items()}
-    columns: dict[tuple[Stream, str], tuple[list[int], list[float]]] = defaultdict(lambda: ([], []))
+    columns: dict[tuple[Stream, str], tuple[list[Integers], list[Array]]] = defaultdict(lambda: ([], []))
     blocks = read_blocks(session, types, window)
     streams = [heard[source.name] for source in blocks.sources]
     checked = [[(stream, topics.delay(stream)) for stream in group if is_checked(stream)] for group in streams]
-    for source, stamp, message in decoded(blocks, streams):
+    decoders = [decoder_of(group) for group in streams]
+    for source, times, message in (each for block in blocks for each in blocks.read_together(decoders, block)):
         for stream, delay in checked[source]:
-            for key, value in _values(message, stream):
+            for key, numbers in _values(message, stream):
                 stamps, values = columns[stream, key]
-                stamps.append(stamp - delay)
-                values.append(value)
+                stamps.append(times - delay)
+                values.append(numbers)
     found: dict[Stream, dict[str, Series]] = {stream: {} for stream in Stream}
     known = {
         stream: [each.name for channel, each in topics.sensors_of(stream, joints).items() if channel not in topics.absent]
@@ -224,16 +226,19 @@ def readings_of(session: Session, topics: Topics, joints: int, window: TimeWindo
         is_lacking = any((stream, name) not in columns for name in known[stream])
         others = {name for other in Stream if other is not stream for name in known[other]}
         if key in known[stream] or (SENSORS[stream].is_accelerometer and known[stream]) or (is_lacking and key not in others):
-            order = np.argsort(stamps, kind="stable")
-            found[stream][key] = Series(np.array(stamps, np.int64)[order], np.array(values, float)[order])
+            times, numbers = np.concatenate(stamps), np.concatenate(values)
+            order = np.argsort(times, kind="stable")
+            found[stream][key] = Series(times[order], numbers[order])
     return found
 
 
-def _values(message: Any, stream: Stream) -> list[tuple[str, float]]:
-    """Return names and readings of a message."""
+def _values(message: Any, stream: Stream) -> Iterator[tuple[str, Array]]:
+    """Return names and readings (k,) of a message."""
     if SENSORS[stream].is_accelerometer:
-        return [(axis, float(getattr(message.linear_acceleration, axis))) for axis in AXES]
-    return list(zip(message.name, map(float, getattr(message, SENSORS[stream].field)), strict=False))
+        names, values = AXES, [getattr(message.linear_acceleration, axis) for axis in AXES]
+    else:
+        names, values = message.name, getattr(message, SENSORS[stream].field)
+    return zip(names, (np.atleast_1d(np.asarray(each, float)) for each in values), strict=False)
 
 
 def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, found: Checked) -> dict[Stream, Lag]:

@@ -95,12 +95,13 @@ def load_truth(folder: Path) -> TipTruth | None:
         if len(text) > LARGEST_TRUTH:
             raise ValueError(f"more than {LARGEST_TRUTH} bytes unpacked")
         header, _, rows = text.partition(b"\n")
-        columns = np.loadtxt(BytesIO(rows), delimiter=",", ndmin=2, unpack=True)
-        table = dict(zip(header.decode("ascii", "replace").strip().split(","), columns, strict=True))
-        if lacking := [name for name in COLUMNS if name not in table]:
+        names = header.decode("ascii", "replace").strip().split(",")
+        if lacking := [name for name in COLUMNS if name not in names]:
             raise ValueError(f"no column {lacking[0]}")
-        values = {name: table[name] for name in COLUMNS}
-        loads = [table.get(name, np.zeros_like(values["t_s"])) for name in LOAD_COLUMNS]
+        places = [i for i, name in enumerate(names) if name in COLUMNS + LOAD_COLUMNS]
+        columns = np.loadtxt(BytesIO(rows), delimiter=",", ndmin=2, unpack=True, usecols=places)
+        values = dict(zip([names[i] for i in places], columns, strict=True))
+        loads = [values.get(name, np.zeros_like(values["t_s"])) for name in LOAD_COLUMNS]
     except (OSError, ValueError, EOFError) as error:
         raise BagError(f"{path}: {error}. It needs columns {', '.join(COLUMNS)}; remove it to replay without.") from None
     return TipTruth(

@@ -9,12 +9,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from itertools import repeat
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from ..bag.reader import Session, read, read_blocks
-from ..bag.session_file import PARSE_ERRORS, WHOLE, SessionBlocks, TimeWindow
+from ..bag.session_file import WHOLE, SessionBlocks, TimeWindow
 from ..bag.writer import RESULT_CHUNK_SIZE, MessageWriter
 from ..config.settings import Settings
 from ..messages.cdr_decoder import CdrDecoder, MessageBlock, stamp_in
@@ -98,7 +98,7 @@ class SessionSamples:
         types = {name: self._topics.inputs[heard[name][0]].type for name in self._wanted}
         blocks, count = read_blocks(session, types, self._window), 0
         streams, drive = [heard[source.name] for source in blocks.sources], self._topics.stroke_reading.stream
-        wires = [_decoder(group) for group in streams]
+        wires = [decoder_of(group) for group in streams]
         for block in blocks:
             first = 0
             while first < len(block):
@@ -129,7 +129,7 @@ class SessionSamples:
         single = list[tuple[int, Sample]]()
         for row in np.sort(np.concatenate(irregular)).tolist() if irregular else ():
             source = int(part.sources[row])
-            stamp, message = _read(blocks, part, row, wires[source])
+            stamp, message = blocks.read(wires[source], part, row)
             single += [(row, each) for each in self._decoder.samples(streams[source], stamp, message)]
         self._keep(single, regular)
 
@@ -163,27 +163,8 @@ class SessionSamples:
                 yield item
 
 
-def decoded(blocks: SessionBlocks, streams: list[list[Stream]]) -> Iterator[tuple[int, int, Any]]:
-    """Yield source, stamp (ns) and message for each message, with the fields that `CdrDecoder` reads for each source's streams.
-
-    Raise BagError if a message cannot be decoded.
-    """
-    wires = [_decoder(group) for group in streams]
-    for block in blocks:
-        for row, source in enumerate(block.sources.tolist()):
-            yield source, *_read(blocks, block, row, wires[source])
-
-
-def _decoder(streams: list[Stream]) -> CdrDecoder:
+def decoder_of(streams: list[Stream]) -> CdrDecoder:
     return CdrDecoder(TYPES[streams[0]], decode, SENSORS[streams[0]].field)
-
-
-def _read(blocks: SessionBlocks, block: MessageBlock, row: int, wire: CdrDecoder) -> tuple[int, Any]:
-    try:
-        return wire.read(block.data(row))
-    except PARSE_ERRORS:
-        blocks.decoded(block, row)  # raises it with its place
-        raise
 
 
 ITEMS_AHEAD = 8  # blocks of samples, or of reports, that wait between two threads

@@ -1,7 +1,7 @@
 """Validation of a file's plain values: unknown keys, quantities with units, pydantic errors in the file's terms.
 
-A value with a unit of its own, such as ``8500 mm``, is turned into the unit that the description of its key states. Units are
-pint's, which is imported when the first one is met. With decimal arithmetic ``3860 mm`` and ``3.86`` are the same number.
+A value with a unit of its own, such as ``8500 mm``, is turned into the unit that the description of its key states. With
+decimal arithmetic ``3860 mm`` and ``3.86`` are the same number.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import difflib
 import re
 from collections.abc import Iterator
 from decimal import Decimal
-from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -19,7 +18,6 @@ from ..config.yaml_text import Document, Place, words
 from ..errors import ABSENT, Fault
 
 if TYPE_CHECKING:
-    from pint import Unit, UnitRegistry
     from pydantic_core import ErrorDetails
 
 Root = TypeVar("Root", bound=BaseModel)
@@ -124,7 +122,22 @@ _FORCES = r"N m(?: s)?/rad|N(?: s)?/m|Pa"
 _STATED = re.compile(rf"(?:,| in) (m/s\^2|kg/m\^3|kg m\^2|kg/m|kg m|kg|{_FORCES}|m\^2|m\^3|m\^4|m|s|rad|degrees)(?![\w^/])")
 _TERM = r"[A-Za-zµμ°]+(?:(?:\^|\*\*)?-?[1-9]|[²³⁴])?"
 _QUANTITY = re.compile(rf"(?P<number>{NUMBER.pattern})\s*(?P<unit>{_TERM}(?:(?:\s*[*/·]\s*|\s+){_TERM})*)")
-_POWERS = str.maketrans({"²": "**2", "³": "**3", "⁴": "**4", "·": "*", "^": "**", "μ": "µ"})
+_FACTOR = re.compile(r"(/?)[\s*·]*([A-Za-zµ°]+)(?:\^|\*\*)?(-?\d)?")
+_PLAIN = str.maketrans("²³⁴μ", "234µ")
+_DEGREE = (Decimal("0.01745329251994329576923690768"), (0, 0, 0, 1))
+_PREFIXES = {"": 0, "G": 9, "M": 6, "k": 3, "h": 2, "d": -1, "c": -2, "m": -3, "u": -6, "µ": -6, "n": -9}
+_BASES = {  # power of ten, and the exponents of m, kg, s and rad; an angle is no pure number
+    "m": (0, (1, 0, 0, 0)), "g": (-3, (0, 1, 0, 0)), "s": (0, (0, 0, 1, 0)), "rad": (0, (0, 0, 0, 1)),
+    "N": (0, (1, 1, -2, 0)), "Pa": (0, (-1, 1, -2, 0)), "bar": (5, (-1, 1, -2, 0)),
+    "l": (-3, (3, 0, 0, 0)), "L": (-3, (3, 0, 0, 0)),
+}  # fmt: skip
+UNITS = {  # factor to m, kg, s and rad, and their exponents
+    "t": (Decimal(1000), (0, 1, 0, 0)), "min": (Decimal(60), (0, 0, 1, 0)), "in": (Decimal("0.0254"), (1, 0, 0, 0)),
+    "ft": (Decimal("0.3048"), (1, 0, 0, 0)), "lb": (Decimal("0.45359237"), (0, 1, 0, 0)),
+    "lbf": (Decimal("4.4482216152605"), (1, 1, -2, 0)), "psi": (Decimal("6894.757293168361336722673"), (-1, 1, -2, 0)),
+    **dict.fromkeys(("deg", "degree", "degrees", "°"), _DEGREE),
+    **{p + base: (Decimal(10) ** (n + k), powers) for p, n in _PREFIXES.items() for base, (k, powers) in _BASES.items()},
+}  # fmt: skip
 
 
 def unit_of(meaning: str) -> str | None:
@@ -156,36 +169,24 @@ def quantity(text: str, unit: str | None) -> float | str | None:
     own, wanted = _unit(name), _unit(unit)
     if own is None or wanted is None:
         return f"`{name}` is no unit that is known"
-    if own.dimensionality != wanted.dimensionality or _is_angle(own) != _is_angle(wanted):
+    if own[1] != wanted[1]:
         return f"`{name}` is no unit of this key, which is in {unit}"
     try:
-        return float(_registry().Quantity(Decimal(number), own).to(wanted).magnitude)
+        return float(Decimal(number) * (own[0] / wanted[0]))
     except (ArithmeticError, ValueError):
         return f"`{number}` is no number that can be had in {unit}"
 
 
-@cache
-def _unit(text: str) -> Unit | None:
-    from pint.errors import PintError
-
-    plain = re.sub(r"(?<=[A-Za-zµ°])(-?[1-9])", r"**\1", text.translate(_POWERS))
-    try:
-        return _registry().parse_units(re.sub(r"(?<=[\w°])\s+(?=[A-Za-zµ°])", "*", plain))
-    except (PintError, ValueError, TypeError, AttributeError):
-        return None
-
-
-def _is_angle(unit: Unit) -> bool:
-    """Return True if a unit is one of angles; pint takes these for pure numbers, as radians are."""
-    root = _registry().get_root_units(unit)[1]
-    return unit.dimensionless and root == _registry().radian
-
-
-@cache
-def _registry() -> UnitRegistry[Any]:
-    from pint import UnitRegistry
-
-    return UnitRegistry(non_int_type=Decimal)
+def _unit(text: str) -> tuple[Decimal, list[int]] | None:
+    """Return the factor of a unit to m, kg, s and rad, and their exponents; None if a part of it is not known."""
+    total, sums = Decimal(1), [0, 0, 0, 0]
+    for slash, name, digits in _FACTOR.findall(text.translate(_PLAIN)):
+        if name not in UNITS:
+            return None
+        (factor, powers), exponent = UNITS[name], int(digits or 1) * (-1 if slash else 1)
+        total *= factor**exponent
+        sums = [s + exponent * p for s, p in zip(sums, powers, strict=True)]
+    return total, sums
 
 
 # -- messages about refused values ------------------------------------------------------------------------------------

@@ -56,6 +56,8 @@ def test_yaml_gives_plain_values_of_bounded_size_only(tmp_path: Path, monkeypatc
             plain(BOMBS[name])
     assert not (tmp_path / "trap").exists()
     assert plain("a: 1\nb: [x, .5, 2001-01-01, null, yes, true]") == {"a": 1, "b": ["x", 0.5, "2001-01-01", None, "yes", True]}
+    plain("[1]").append(2)
+    assert plain("[1]") == [1]
     assert plain("") is None and plain("&a x") == "x" and plain("[&a [1], *a]") == [[1], [1]]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from command import main
 from default_boom import default_text
 
 from boom_twin.cli.replay import flat
+from boom_twin.offline.progress import ProgressLine
 
 STROKES = "0.63,0.165,0.235,0.187"
 
@@ -76,3 +78,17 @@ def test_a_summary_as_json_is_flat_and_has_its_alarms() -> None:
         "samples": 3, "events_not_followed": 2, "alarm_channel": ["joint_2", "joint_3"], "alarm_kind": ["residual"] * 2,
         "alarm_from_s": [4.0] * 2, "alarm_to_s": [None] * 2, "alarm_cause": ["cylinder_2.k"] * 2,
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+def test_progress_is_a_line_on_a_terminal_only(
+    is_terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: is_terminal)
+    with closing(ProgressLine(8, "messages", "replay")) as line:
+        for _ in range(8):
+            line.update(1)
+    lines = capsys.readouterr().err.split("\r")[1:]
+    assert [each[:31] for each in lines[:: len(lines) - 1]] == [
+        "replay:  12%, 1 of 8 messages, ", "replay: 100%, 8 of 8 messages, ",
+    ] if is_terminal else not lines  # fmt: skip

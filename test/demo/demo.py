@@ -22,7 +22,7 @@ from ros_messages import Output, Topic, load_topics, stamp_of
 from boom_twin import BagError, BoomTwinError, Stream
 from boom_twin.bag.session_model import settings_of
 from boom_twin.offline.history import draw
-from boom_twin.offline.progress import progress_of
+from boom_twin.offline.progress import ProgressLine
 from boom_twin.offline.recording import Stretch
 from boom_twin.report.evaluation import evaluated_replay
 from boom_twin.ros.startup import require_rclpy
@@ -165,7 +165,7 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
         player = Player(session)
         running.wait_for_discovery(player)
         total, before = round(player.length(0.0, duration)), 0
-        bar = progress_of(total, "s", "playing")
+        bar = ProgressLine(total, "s", "playing")
         for elapsed in running.play(player, duration):
             bar.update((elapsed - before) * NANO)
             before = elapsed

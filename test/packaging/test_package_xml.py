@@ -16,7 +16,7 @@ import boom_twin
 ROOT = Path(__file__).parents[2]
 PACKAGE = ElementTree.parse(ROOT / "package.xml").getroot()
 SETUP = (ROOT / "setup.py").read_text(encoding="utf-8")
-NOT_OF_ROS = {"boom_twin", "numpy", "pydantic", "tqdm", "rpyutils"}  # rpyutils comes with rclpy
+NOT_OF_ROS = {"boom_twin", "numpy", "pydantic", "rpyutils"}  # rpyutils comes with rclpy
 
 ON_REQUEST = {"robot_state_publisher", "rviz2"}  # started if asked for; an error says how to install them
 

@@ -68,6 +68,7 @@ K = "joints[1].cylinder.k"
     ("path", "value", "words"),
     [
         ("base.inclination", "3 m/m", ("`m/m` is no unit of this key, which is in rad",)),
+        ("base.stiffness", "5 kN m", ("`kN m` is no unit of this key, which is in N m/rad",)),
         ("base.stiffness", "5 kN/mm", ("`kN/mm` is no unit of this key, which is in N m/rad",)),
         ("material.nu", "0.3 mm", ("a number without a unit is needed",)),
         (K, "30 kg/mm", ("`kg/mm` is no unit of this key, which is in N/m", "Give the stiffness of the oil spring, N/m.")),

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ...analysis.methods import DURATION, motion_of
-from ...offline.progress import progress_of
+from ...offline.progress import ProgressLine
 from ...plots.study import Curve, Panel, error_picture
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
@@ -115,7 +115,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     problem = pose(scene, motion_of(scene, posture, 0.6 if quick else DURATION), quick)
     cases: list[Case] = [*own_cases(scene, quick), *(peer_cases(quick) if problem.exudyn else ())]
     runner, rounds = Runner(problem), 1 if quick else 5  # a case runs in every round; its time is that of the fastest run
-    bar = progress_of(rounds * len(cases), "cases", "study error")
+    bar = ProgressLine(rounds * len(cases), "cases", "study error")
     rows = runner.rows(cases, rounds, lambda: bar.update(1))
     bar.close()
     duel = same_step(runner, rows, 2 if quick else 5)
