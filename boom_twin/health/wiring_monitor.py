@@ -22,6 +22,7 @@ from .alarms import UNKNOWN
 from .blocks import Block, means_of
 
 KIND = "wiring"  # kind of all its alarms
+SCENE = "scene"  # channel and cause of the alarm that the scene is of another boom
 CHECKS = 6, 20, 50, 100, 200, 400  # blocks after a start, at the end of which all of them are checked
 NONE = np.zeros((), bool)  # of the channels of a stream that is not checked
 DELAY = 20  # blocks from a check until its answer is taken
@@ -64,7 +65,7 @@ class WiringMonitor:
     def begin(self) -> None:
         """Restart with the boom at rest; alarms last until the next check."""
         self._blocks: list[tuple[int, Mapping[Stream, Array]]] = []
-        self._age, self._searched = 0, False
+        self._age, self._searched, self._is_other_boom = 0, False, False
         self._model: RestModel | None = None
         self._search: tuple[int, Future[Checked | None]] | None = None
         self._wrong = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
@@ -78,8 +79,8 @@ class WiringMonitor:
 
     @property
     def has_wrong_strokes(self) -> bool:
-        """Return True if strokes are not read as declared, so that every prediction is wrong."""
-        return bool(self._wrong[Stream.STROKES].any())
+        """Return True if strokes are not read as declared, or the scene is of another boom: every prediction is wrong."""
+        return self._is_other_boom or bool(self._wrong[Stream.STROKES].any())
 
     def wrong(self, stream: Stream) -> NDArray[np.bool_]:
         """Return the channels of a stream that must not be compared with the prediction, shape (channels,) or ()."""
@@ -139,6 +140,7 @@ class WiringMonitor:
         if found is None:
             return
         is_sound = not any(verdict.is_wrong for verdict in found.verdicts)
+        self._is_other_boom &= not is_sound
         for verdict in found.verdicts:
             self._wrong[verdict.stream] &= not is_sound  # wrong strokes show in other sensors only
             place = self._channels[verdict.stream].index(verdict.channel)
@@ -161,7 +163,10 @@ class WiringMonitor:
 
     def _reported(self, found: Checked, end: int) -> list[Alarm]:
         """Begin and end alarms by the result of a search."""
-        news, self._searched = list[Alarm](), True
+        news, self._searched, self._is_other_boom = list[Alarm](), True, found.is_other_boom
+        if found.is_other_boom and SCENE not in self._last:
+            self._last[SCENE] = Alarm(SCENE, KIND, self._blocks[0][0], None, SCENE, ", ".join(found.wrong_angles))
+            news.append(self._last[SCENE])
         for doubted in self._doubted.values():
             doubted[:] = False
         for verdict in found.verdicts:
@@ -170,7 +175,8 @@ class WiringMonitor:
             )
             self._wrong[verdict.stream][self._channels[verdict.stream].index(verdict.channel)] = is_wrong
             name = channel_name(verdict)
-            if is_wrong and (name not in self._last or (verdict.is_sure and name not in self._sure)):
+            is_told = is_wrong and not found.is_other_boom
+            if is_told and (name not in self._last or (verdict.is_sure and name not in self._sure)):
                 cause = f"{name}.sensor"
                 since = self._last[name].since if name in self._last else self._blocks[0][0]
                 chance = 1.0 / (1.0 + math.exp(-verdict.margin))  # posterior beside the next way to read it
@@ -184,6 +190,7 @@ class WiringMonitor:
         """End the alarms of channels that are read as declared by now."""
         wrong = {name for stream, names in self._channels.items() for name in _chosen(names, self._wrong[stream])}
         wrong |= {SENSORS[s].stem for s, each in self._wrong.items() if SENSORS[s].is_accelerometer and each.any()}
+        wrong = {SCENE} if self._is_other_boom else wrong
         self._sure &= wrong
         return [replace(self._last.pop(name), until=end) for name in list(self._last) if name not in wrong]
 
