@@ -62,7 +62,7 @@ class DeviationMonitor:
         if not self._last and not (np.abs(off) > self._limits).any():
             self._since[:] = -1
             return []
-        is_known = (readings.counts > 0.0) & (slow.weight > ENOUGH) & ~masked
+        is_known = np.isfinite(readings.means[0]) & (slow.weight > ENOUGH) & ~masked
         least = np.maximum(self._limits, SIGMAS[self._stream] * np.sqrt(slow.variance / weight))
         is_far, is_near = is_known & (np.abs(off) > least), is_known & (np.abs(off) < GONE * self._limits)
         is_explained = np.abs(off) < LONGEST * np.abs(slow.rate) / weight + least  # by a lag, see `lag_monitor`

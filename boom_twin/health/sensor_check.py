@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ..kernels.jit import SameTypes, hold
 from ..scene.schema import Scene
 from ..types import GIVE, Array, Mount, Stream, channels_of
-from .sensor_findings import FALSE_ALARM, OUTLIER, OUTSIDE, SILENT, SPIKES, STUCK, find
+from .sensor_findings import FALSE_ALARM, OUTSIDE, SILENT, SPIKES, STUCK, find
 from .sensor_findings import NOISY as IS_NOISY
-from .sensor_survey import LATELY, ROOM, CheckLimits, CheckWork, survey
+from .sensor_survey import LATELY, NOISY, NOISY_WINDOW, ROOM, SILENT_FOR, CheckWork, survey
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -50,15 +50,10 @@ def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> f
 
 Flags = NDArray[np.bool_]
 
-NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
 JERK = 3.0  # m/s^3 of a cylinder in haste, which is no noise of its sensor: 0.2 m in 1.6 s
-USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
 NOISE_OVER = "noise_over_"  # and the name of a setting: how its figures are called
-MEASURED = 4.0  # times the stated noise, above which there may be more: a reading counts for so much at most
 MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
 REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to repeat
-SILENT_FOR = 0.5  # s; readings that lie farther apart are no neighbours: neither jumps nor spikes show across such a gap
-MISSING = 0.1  # share of the readings
 
 
 def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, tuple[Array, Array]]:
@@ -117,13 +112,9 @@ class SensorCheck:
         self._fastest = fastest
         count, rows = len(low), 3 + ROOM
         margin, stated2 = 5.0 * self._sigma, self._sigma**2
-        limits = CheckLimits(
-            gap=SILENT_FOR, cut=(MEASURED * NOISY) ** 2 * stated2, stated=stated2, window=NOISY_WINDOW,
-            long_window=USUAL_WINDOW, leap=OUTLIER * self._sigma, loud=NOISY**2, loudest_usual=NOISY**2 * stated2, lack=MISSING,
-            patience=repeats(sigma, resolution),
-        )  # fmt: skip
         self._known = CheckWork(
-            limits=limits,
+            stated=stated2,
+            patience=repeats(sigma, resolution),
             lately=np.array([(math.inf, 0, stated2, stated2)], LATELY),
             times=np.zeros(rows),
             raw=np.full((rows, count), np.nan),

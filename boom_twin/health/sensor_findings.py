@@ -6,12 +6,13 @@ import math
 from statistics import NormalDist
 
 from ..kernels.jit import inner, kernel
-from .sensor_survey import loud, noise2_at
+from .sensor_survey import SILENT_FOR, loud, noise2_at
 
 STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
 FALSE_ALARM = 1e-12  # probability, for each reading, of a finding in white noise
 OUTLIER = -math.sqrt(2.0) * NormalDist().inv_cdf(0.5 * FALSE_ALARM)  # difference of two readings, over their noise
 QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
+MISSING = 0.1  # share of the readings
 REPEATS_FOR = 0.4  # s, at least, of one reading again and again
 ENOUGH, MEDIAN2 = 6, 0.4549  # third differences whose median tells noise; that of the square of a standard normal value
 
@@ -38,17 +39,17 @@ def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
     jumped : ndarray, shape (channels,)
         Written: how far readings changed from one to the next, for good, while the model did not; 0 where they did not.
     """
-    limits, power, count = sensors.limits, sensors.power, 3 + sensors.lately[0].rows
+    power, count = sensors.power, 3 + sensors.lately[0].rows
     live, newest, found = is_any_live(sensors), sensors.times[count - 1], False
     for i in range(power.shape[0]):
         is_spiky, jumped[i] = False, 0.0
-        if largest > limits.leap:
+        if largest > OUTLIER * math.sqrt(sensors.stated):
             least = OUTLIER * noise_of(sensors, count, i, column)
             is_spiky, jumped[i] = has_spikes(sensors, count, i, least), jump(sensors, count, i, least, fastest)
-        flags[STUCK, i] = live and sensors.run[i] >= limits.patience and newest - sensors.since[i] >= REPEATS_FOR
+        flags[STUCK, i] = live and sensors.run[i] >= sensors.patience and newest - sensors.since[i] >= REPEATS_FOR
         flags[NOISY, i] = is_known and power[i] > loud(sensors)
         flags[SPIKES, i] = is_known and is_spiky
-        flags[SILENT, i] = now - sensors.heard[i] > limits.gap or sensors.missing[i] > limits.lack
+        flags[SILENT, i] = now - sensors.heard[i] > SILENT_FOR or sensors.missing[i] > MISSING
         flags[OUTSIDE, i] = sensors.outside[i] > 0.5 * (count - 3)
         found = found or jumped[i] != 0.0
         for kind in range(5):
@@ -59,7 +60,7 @@ def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
 @inner
 def is_any_live(sensors):
     """Return True if a channel of several is alive with noise."""
-    power, least = sensors.power, QUIET * math.sqrt(sensors.limits.stated)
+    power, least = sensors.power, QUIET * math.sqrt(sensors.stated)
     live = False
     for i in range(power.shape[0] if power.shape[0] > 1 else 0):
         live = live or power[i] > least * least
@@ -73,7 +74,7 @@ def noise_of(sensors, count, i, column):
     That median does not wait for the noise to be measured, as a mean over time does, and one spike leaves it as it is. A sensor
     that has twice the stated noise gives no spikes by that.
     """
-    variance, size = sensors.limits.stated, 0
+    variance, size = sensors.stated, 0
     if sensors.power[i] > variance:
         variance = sensors.power[i]
     for t in range(3, count):
@@ -99,7 +100,7 @@ def sorted_in(column, size, value):
 @inner
 def step(sensors, t, i):
     """Return the change of the residual to reading t of channel i from the one before; NaN across a gap."""
-    if sensors.times[t] - sensors.times[t - 1] > sensors.limits.gap:
+    if sensors.times[t] - sensors.times[t - 1] > SILENT_FOR:
         return math.nan
     return sensors.left[t, i] - sensors.left[t - 1, i]
 

@@ -14,6 +14,10 @@ from ..types import NANO, Array
 Integers = NDArray[np.int64]
 
 ROOM = 32  # readings of a block for which callers allocate memory at first
+NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
+USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
+MEASURED = 4.0  # times the stated noise, above which there may be more: a reading counts for so much at most
+SILENT_FOR = 0.5  # s; readings that lie farther apart are no neighbours: neither jumps nor spikes show across such a gap
 SHAKEN = 3.0  # multiple of the stated variance above which second differences show motion
 WHITE = 0.75  # ratio of third to second differences below which they show motion, not noise
 
@@ -39,36 +43,13 @@ class ReadingsWork(NamedTuple):
     """State of `summarise` for one stream.
 
     stated : variance of the noise.
-    counts, means : (channels,), (2, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
+    means : (2, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
     slow : SlowMeans.
     """
 
     stated: float
-    counts: Array
     means: Array
     slow: SlowMeans
-
-
-@by_reference
-class CheckLimits(NamedTuple):
-    """Limits of `survey` and `find`.
-
-    gap : time (s) between readings above which they are not compared. cut : largest variance that one outlier adds. stated :
-    variance of the noise. window, long_window : averaging times (s) of a channel's noise and of the usual noise. Findings need
-    more than these: leap, change between two readings; loud, multiple of the usual variance, bounded by loudest_usual; lack,
-    share of missing readings; patience, repetitions of a reading.
-    """
-
-    gap: float
-    cut: float
-    stated: float
-    window: float
-    long_window: float
-    leap: float
-    loud: float
-    loudest_usual: float
-    lack: float
-    patience: int
 
 
 LATELY = np.dtype([("first", float), ("rows", np.int64), ("noise", float), ("lasting", float)])
@@ -79,6 +60,7 @@ LATELY = np.dtype([("first", float), ("rows", np.int64), ("noise", float), ("las
 class CheckWork(NamedTuple):
     """State of `survey` for one stream.
 
+    stated : variance of the noise. patience : repetitions of a reading above which its sensor is stuck.
     lately : (1,) see `LATELY`.
     times, raw, left : (3 + k,), (3 + k, channels), (3 + k, channels) stamps (s), readings, residuals. The newest three before
     the block are first.
@@ -88,7 +70,8 @@ class CheckWork(NamedTuple):
     missing, outside : (channels,) share of missing readings; number of readings of the newest block out of range.
     """
 
-    limits: CheckLimits
+    stated: float
+    patience: int
     lately: NDArray[np.void]
     times: Array
     raw: Array
@@ -152,22 +135,22 @@ def survey(sensors, stamps, raw, expected):
     float
         Largest change of `left` between two readings, except across a gap.
     """
-    limits, lately, rows = sensors.limits, sensors.lately[0], stamps.shape[0]
+    lately, rows = sensors.lately[0], stamps.shape[0]
     keep_newest(sensors)
     lately.rows = rows
     if not lately.first <= stamps[0]:
         lately.first = stamps[0]
     span = max(stamps[rows - 1] - stamps[0], 1e-3)
-    largest = go_on(sensors, stamps, raw, expected, min(1.0, span / limits.window))
-    lately.noise = usual_power(sensors.power, limits.stated)
-    lately.lasting += min(1.0, span / limits.long_window) * (lately.noise - lately.lasting)
+    largest = go_on(sensors, stamps, raw, expected, min(1.0, span / NOISY_WINDOW))
+    lately.noise = usual_power(sensors.power, sensors.stated)
+    lately.lasting += min(1.0, span / USUAL_WINDOW) * (lately.noise - lately.lasting)
     return largest
 
 
 @inner
 def loud(sensors):
     """Return the variance of the noise above which a channel is noisy."""
-    return sensors.limits.loud * min(sensors.lately[0].noise, sensors.limits.loudest_usual)
+    return NOISY**2 * min(sensors.lately[0].noise, NOISY**2 * sensors.stated)
 
 
 @inner
@@ -206,7 +189,7 @@ def usual_power(power, stated):
 def go_on(sensors, stamps, raw, expected, share):
     """Take the readings of a block, with weight `share` in the averages; return the largest change of `left` within gaps."""
     times, all_raw, left, count = sensors.times, sensors.raw, sensors.left, 3 + stamps.shape[0]
-    gap, cut, variance = sensors.limits.gap, sensors.limits.cut, sensors.limits.stated
+    variance, cut = sensors.stated, (MEASURED * NOISY) ** 2 * sensors.stated
     power, run, missing, outside = sensors.power, sensors.run, sensors.missing, sensors.outside
     for t in range(3, count):
         times[t] = stamps[t - 3]
@@ -217,7 +200,7 @@ def go_on(sensors, stamps, raw, expected, share):
             all_raw[t, i], left[t, i] = raw[t - 3, i], raw[t - 3, i] - expected[t - 3, i]
         for t in range(1, count):
             step = abs(left[t, i] - left[t - 1, i])
-            if times[t] - times[t - 1] <= gap and step > largest:
+            if times[t] - times[t - 1] <= SILENT_FOR and step > largest:
                 largest = step
             if t < 3:
                 continue
@@ -264,7 +247,7 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
     share : float
         Weight of the block in the slow means.
     """
-    counts, means, slow, last = work.counts, work.means, work.slow, stamps.shape[0] - 1
+    means, slow, last = work.means, work.slow, stamps.shape[0] - 1
     span = (stamps[last] - stamps[0]) * NANO
     for i in range(raw.shape[1]):
         known, read, off, variance = 0, 0.0, 0.0, 0.0
@@ -274,7 +257,7 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
                 read += raw[t, i]
                 off += left[t, i]
                 variance += sigmas[t, i] * sigmas[t, i]
-        counts[i], means[:, i] = known, math.nan
+        means[:, i] = math.nan
         if known > 0:
             means[0, i], means[1, i] = read / known, (read - off) / known
         rate = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span if span > 0.0 else math.nan

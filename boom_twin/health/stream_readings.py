@@ -22,10 +22,8 @@ class StreamReadings(NamedTuple):
     Attributes
     ----------
     rows : MeasuredRows
-    counts : ndarray, shape (channels,)
-        Readings that the model has something to compare with.
     means : ndarray, shape (2, channels)
-        Means of readings, and of the expected ones; NaN of none.
+        Means of readings that the model has something to compare with, and of the expected ones; NaN of none.
     slow : SlowMeans
     is_bent : bool
         True if trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by second and
@@ -33,7 +31,6 @@ class StreamReadings(NamedTuple):
     """
 
     rows: MeasuredRows
-    counts: Array
     means: Array
     slow: SlowMeans
     is_bent: bool
@@ -55,9 +52,9 @@ class StreamSurvey:
 
     def __init__(self, variance: float, channels: int) -> None:
         self.slow, unknown = SlowMeans(*np.zeros((5, channels))), np.full((2, channels), np.nan)
-        self._work = ReadingsWork(variance, np.zeros(channels), unknown.copy(), self.slow)
+        self._work = ReadingsWork(variance, unknown.copy(), self.slow)
         self._held = hold(self._work)
-        self._nothing = StreamReadings(MeasuredRows.room(0, channels), np.zeros(channels), unknown, self.slow, False)
+        self._nothing = StreamReadings(MeasuredRows.room(0, channels), unknown, self.slow, False)
         self._summarise = SameTypes(summarise)
 
     def take(self, rows: MeasuredRows | None, masked: NDArray[np.bool_], span: float) -> StreamReadings:
@@ -76,4 +73,4 @@ class StreamSurvey:
             return self._nothing
         columns = map(np.ascontiguousarray, rows)
         is_bent = self._summarise(self._held, *columns, masked, min(1.0, span / WINDOW))
-        return StreamReadings(rows, self._work.counts.copy(), self._work.means.copy(), self.slow, bool(is_bent))
+        return StreamReadings(rows, self._work.means.copy(), self.slow, bool(is_bent))
