@@ -14,7 +14,7 @@ from ..scene.schema import Scene
 from ..types import GIVE, Array, Mount, Stream, channels_of
 from .sensor_findings import FALSE_ALARM, OUTSIDE, SILENT, SPIKES, STUCK, find
 from .sensor_findings import NOISY as IS_NOISY
-from .sensor_survey import LATELY, NOISY, NOISY_WINDOW, ROOM, SILENT_FOR, CheckWork, survey
+from .sensor_survey import BEFORE, LATELY, NOISY, NOISY_WINDOW, SILENT_FOR, CheckWork, survey
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -110,15 +110,11 @@ class SensorCheck:
     def __init__(self, sigma: float, resolution: float, low: Array, high: Array, fastest: float) -> None:
         self._sigma = math.sqrt(sigma**2 + resolution**2 / 12.0)
         self._fastest = fastest
-        count, rows = len(low), 3 + ROOM
-        margin, stated2 = 5.0 * self._sigma, self._sigma**2
+        count, margin, stated2 = len(low), 5.0 * self._sigma, self._sigma**2
         self._known = CheckWork(
             stated=stated2,
             patience=repeats(sigma, resolution),
-            lately=np.array([(math.inf, 0, stated2, stated2)], LATELY),
-            times=np.zeros(rows),
-            raw=np.full((rows, count), np.nan),
-            left=np.full((rows, count), np.nan),
+            lately=np.array([(math.inf, stated2, stated2)], LATELY),
             low=low - margin,
             high=high + margin,
             heard=np.full(count, np.nan),
@@ -129,7 +125,8 @@ class SensorCheck:
             outside=np.zeros(count),
         )
         self._held = hold(self._known)
-        self._survey, self._find, self._column = SameTypes(survey), SameTypes(find), np.zeros(rows)
+        self._survey, self._find = SameTypes(survey), SameTypes(find)
+        self._newest = np.zeros(BEFORE), *np.full((2, BEFORE, count), np.nan)  # stamps (s), readings, residuals
         self._calm = SensorFindings({}, np.zeros(count), np.full(count, np.nan))
 
     @property
@@ -149,32 +146,24 @@ class SensorCheck:
         now : float
             End of the block, s.
         """
-        rows = len(stamps)
-        if not rows:
+        if not len(stamps):
             silent = now - self._known.heard > SILENT_FOR
             return self._calm._replace(flags={"dropout": silent}) if silent.any() else self._calm
-        self._make_room(3 + rows)
-        known = self._known
-        largest = self._survey(self._held, stamps, np.ascontiguousarray(raw), np.ascontiguousarray(expected))
-        interval = (known.times[2 + rows] - known.times[2]) / rows
+        pairs = zip(self._newest, (stamps, raw, raw - expected), strict=True)
+        times, raw, left = rows = tuple(np.ascontiguousarray(np.concatenate(pair)) for pair in pairs)
+        self._newest = tuple(each[-BEFORE:] for each in rows)
+        known, largest = self._known, self._survey(self._held, *rows)
+        interval = (times[-1] - times[BEFORE - 1]) / len(stamps)
         is_motion = self._fastest > 0.0 and JERK * interval**3 > NOISY * self._sigma  # what bends readings so much
         is_known = bool(now - known.lately["first"][0] > NOISY_WINDOW and not is_motion)  # how noisy the sensors are
         flags, jumped = np.empty((5, len(known.power)), dtype=bool), np.empty(len(known.power))
-        if not self._find(self._held, largest, now, is_known, self._fastest, self._column, flags, jumped):
+        if not self._find(self._held, *rows, largest, now, is_known, self._fastest, np.empty_like(times), flags, jumped):
             return self._calm
         by_kind = {
             "stuck": flags[STUCK], "noise": flags[IS_NOISY], "spikes": flags[SPIKES], "jump": jumped != 0.0,
             "dropout": flags[SILENT], "range": flags[OUTSIDE],
         }  # fmt: skip
-        return SensorFindings(by_kind, jumped, known.left[2 + rows].copy())
-
-    def _make_room(self, rows: int) -> None:
-        """Make room for `rows` readings, including the newest three before the block."""
-        known = self._known
-        if rows > len(known.times):
-            times, raw, left = (np.resize(each, (2 * rows, *each.shape[1:])) for each in (known.times, known.raw, known.left))
-            self._known, self._column = known._replace(times=times, raw=raw, left=left), np.zeros(2 * rows)
-            self._held = hold(self._known)
+        return SensorFindings(by_kind, jumped, left[-1].copy())
 
 
 def repeats(sigma: float, resolution: float) -> int:

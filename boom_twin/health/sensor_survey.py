@@ -13,7 +13,6 @@ from ..types import NANO, Array
 
 Integers = NDArray[np.int64]
 
-ROOM = 32  # readings of a block for which callers allocate memory at first
 NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
 USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
 MEASURED = 4.0  # times the stated noise, above which there may be more: a reading counts for so much at most
@@ -52,8 +51,9 @@ class ReadingsWork(NamedTuple):
     slow: SlowMeans
 
 
-LATELY = np.dtype([("first", float), ("rows", np.int64), ("noise", float), ("lasting", float)])
-"""Time (s) of the first reading; readings in the newest block; usual variance of the noise, now and averaged."""
+LATELY = np.dtype([("first", float), ("noise", float), ("lasting", float)])
+"""Time (s) of the first reading; usual variance of the noise, now and averaged."""
+BEFORE = 3  # readings before a block that `survey` and `find` take with it
 
 
 @by_reference
@@ -62,8 +62,6 @@ class CheckWork(NamedTuple):
 
     stated : variance of the noise. patience : repetitions of a reading above which its sensor is stuck.
     lately : (1,) see `LATELY`.
-    times, raw, left : (3 + k,), (3 + k, channels), (3 + k, channels) stamps (s), readings, residuals. The newest three before
-    the block are first.
     low, high : (channels,) the range of the sensors.
     heard : (channels,) time of the newest reading, s; NaN before the first.
     power, run, since : (channels,) variance of the noise, see `noise2_at`; repetitions of the newest reading; first stamp (s).
@@ -73,9 +71,6 @@ class CheckWork(NamedTuple):
     stated: float
     patience: int
     lately: NDArray[np.void]
-    times: Array
-    raw: Array
-    left: Array
     low: Array
     high: Array
     heard: Array
@@ -120,28 +115,26 @@ def noise2_at(times, values, t, i):
 
 
 @kernel
-def survey(sensors, stamps, raw, expected):
+def survey(sensors, times, raw, left):
     """Take a block of readings, and update the statistics of every channel.
 
     Parameters
     ----------
     sensors : CheckWork
         Updated with the block.
-    stamps, raw, expected : ndarray, shape (k,), (k, channels), (k, channels)
-        Stamps (s), readings, readings by the model; k > 0.
+    times, raw, left : ndarray, shape (3 + k,), (3 + k, channels), (3 + k, channels)
+        Stamps (s), readings, residuals; the newest `BEFORE` before the block are first; k > 0.
 
     Returns
     -------
     float
         Largest change of `left` between two readings, except across a gap.
     """
-    lately, rows = sensors.lately[0], stamps.shape[0]
-    keep_newest(sensors)
-    lately.rows = rows
-    if not lately.first <= stamps[0]:
-        lately.first = stamps[0]
-    span = max(stamps[rows - 1] - stamps[0], 1e-3)
-    largest = go_on(sensors, stamps, raw, expected, min(1.0, span / NOISY_WINDOW))
+    lately, begin = sensors.lately[0], times[BEFORE]
+    if not lately.first <= begin:
+        lately.first = begin
+    span = max(times[times.shape[0] - 1] - begin, 1e-3)
+    largest = go_on(sensors, times, raw, left, min(1.0, span / NOISY_WINDOW))
     lately.noise = usual_power(sensors.power, sensors.stated)
     lately.lasting += min(1.0, span / USUAL_WINDOW) * (lately.noise - lately.lasting)
     return largest
@@ -151,16 +144,6 @@ def survey(sensors, stamps, raw, expected):
 def loud(sensors):
     """Return the variance of the noise above which a channel is noisy."""
     return NOISY**2 * min(sensors.lately[0].noise, NOISY**2 * sensors.stated)
-
-
-@inner
-def keep_newest(sensors):
-    """Move the newest three readings to the front."""
-    rows = sensors.lately[0].rows
-    for t in range(3):
-        sensors.times[t] = sensors.times[rows + t]
-        for i in range(sensors.raw.shape[1]):
-            sensors.raw[t, i], sensors.left[t, i] = sensors.raw[rows + t, i], sensors.left[rows + t, i]
 
 
 @inner
@@ -186,44 +169,39 @@ def usual_power(power, stated):
 
 
 @inner
-def go_on(sensors, stamps, raw, expected, share):
+def go_on(sensors, times, raw, left, share):
     """Take the readings of a block, with weight `share` in the averages; return the largest change of `left` within gaps."""
-    times, all_raw, left, count = sensors.times, sensors.raw, sensors.left, 3 + stamps.shape[0]
     variance, cut = sensors.stated, (MEASURED * NOISY) ** 2 * sensors.stated
     power, run, missing, outside = sensors.power, sensors.run, sensors.missing, sensors.outside
-    for t in range(3, count):
-        times[t] = stamps[t - 3]
-    largest = 0.0
+    count, largest = times.shape[0], 0.0
     for i in range(power.shape[0]):
         total, known, lacking, newest, outside[i] = 0.0, 0, 0, -1, 0.0
-        for t in range(3, count):
-            all_raw[t, i], left[t, i] = raw[t - 3, i], raw[t - 3, i] - expected[t - 3, i]
         for t in range(1, count):
             step = abs(left[t, i] - left[t - 1, i])
             if times[t] - times[t - 1] <= SILENT_FOR and step > largest:
                 largest = step
-            if t < 3:
+            if t < BEFORE:
                 continue
             noise2 = noise2_at(times, left, t, i)
             if not math.isnan(noise2):
                 total += min(noise2, cut)
                 known += 1
-            if math.isnan(all_raw[t, i]):
+            if math.isnan(raw[t, i]):
                 lacking += 1
-            elif all_raw[t, i] < sensors.low[i] or all_raw[t, i] > sensors.high[i]:
+            elif raw[t, i] < sensors.low[i] or raw[t, i] > sensors.high[i]:
                 outside[i] += 1.0
-            if all_raw[t, i] == all_raw[t - 1, i]:
+            if raw[t, i] == raw[t - 1, i]:
                 run[i] += 1
-            elif math.isfinite(all_raw[t, i]):
+            elif math.isfinite(raw[t, i]):
                 run[i], sensors.since[i] = 0, times[t]
-            if math.isfinite(all_raw[t, i]):
+            if math.isfinite(raw[t, i]):
                 newest = t
         if newest >= 0:
             if not times[newest] <= sensors.heard[i]:
                 sensors.heard[i] = times[newest]
         elif math.isnan(sensors.heard[i]):
-            sensors.heard[i] = times[3]
-        missing[i] += share * (lacking / (count - 3) - missing[i])
+            sensors.heard[i] = times[BEFORE]
+        missing[i] += share * (lacking / (count - BEFORE) - missing[i])
         if known > 0:
             heard = total / known
             if math.isnan(power[i]):
