@@ -14,7 +14,7 @@ from ..types import NANO, SENSORS, Alarm, Array, Stream, channels_of
 from ..wiring.readings import LONGEST
 from .alarms import change_text
 from .blocks import Block
-from .stream_readings import ENOUGH, WINDOW, StreamReadings
+from .sensor_check import ENOUGH, WINDOW, StreamReadings
 
 KIND = "deviation"  # kind of all its alarms
 SIGMAS = {Stream.ANGLES: 3.0, Stream.FORCES: 10.0}

@@ -1,4 +1,4 @@
-"""Check the readings of single sensors, block by block: stuck, noisy, spikes, jumps, silence, readings out of range."""
+"""Check the readings of a stream, block by block: stuck, noisy, spikes, jumps, silence, out of range; means, motion."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from ..kernels.jit import SameTypes, hold
 from ..scene.schema import Scene
 from ..types import GIVE, Array, Mount, Stream, channels_of
+from .blocks import MeasuredRows
 from .sensor_findings import FALSE_ALARM, OUTSIDE, SILENT, SPIKES, STUCK, find
 from .sensor_findings import NOISY as IS_NOISY
-from .sensor_survey import BEFORE, LATELY, NOISY, NOISY_WINDOW, SILENT_FOR, CheckWork, survey
+from .sensor_survey import BEFORE, LATELY, NOISY, NOISY_WINDOW, SILENT_FOR, CheckWork, SlowMeans, summarise, survey
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -53,6 +54,8 @@ Flags = NDArray[np.bool_]
 JERK = 3.0  # m/s^3 of a cylinder in haste, which is no noise of its sensor: 0.2 m in 1.6 s
 NOISE_OVER = "noise_over_"  # and the name of a setting: how its figures are called
 MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
+WINDOW = 2.0  # s, time constant of the slow means
+ENOUGH = 0.6  # weight of slow means that are judged: after 1.8 s
 REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to repeat
 
 
@@ -94,6 +97,26 @@ class SensorFindings(NamedTuple):
     level: Array
 
 
+class StreamReadings(NamedTuple):
+    """A block of k readings.
+
+    Attributes
+    ----------
+    rows : MeasuredRows
+    means : ndarray, shape (2, channels)
+        Means of readings that the model has something to compare with, and of the expected ones; NaN of none.
+    slow : SlowMeans
+    is_bent : bool
+        True if trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by second and
+        by third differences, motion much less by third ones.
+    """
+
+    rows: MeasuredRows
+    means: Array
+    slow: SlowMeans
+    is_bent: bool
+
+
 class SensorCheck:
     """Check of the readings of one stream, block by block.
 
@@ -105,12 +128,17 @@ class SensorCheck:
         Their range.
     fastest : float
         What the quantity may change by, per s: more is a jump of the sensor. 0 where a jump is judged by the noise alone.
+
+    Attributes
+    ----------
+    slow : SlowMeans
     """
 
     def __init__(self, sigma: float, resolution: float, low: Array, high: Array, fastest: float) -> None:
         self._sigma = math.sqrt(sigma**2 + resolution**2 / 12.0)
         self._fastest = fastest
         count, margin, stated2 = len(low), 5.0 * self._sigma, self._sigma**2
+        self.slow, unknown = SlowMeans(*np.zeros((5, count))), np.full((2, count), np.nan)
         self._known = CheckWork(
             stated=stated2,
             patience=repeats(sigma, resolution),
@@ -123,16 +151,37 @@ class SensorCheck:
             since=np.zeros(count),
             missing=np.zeros(count),
             outside=np.zeros(count),
+            means=unknown.copy(),
+            slow=self.slow,
         )
         self._held = hold(self._known)
-        self._survey, self._find = SameTypes(survey), SameTypes(find)
+        self._survey, self._find, self._summarise = SameTypes(survey), SameTypes(find), SameTypes(summarise)
         self._newest = np.zeros(BEFORE), *np.full((2, BEFORE, count), np.nan)  # stamps (s), readings, residuals
         self._calm = SensorFindings({}, np.zeros(count), np.full(count, np.nan))
+        self._nothing = StreamReadings(MeasuredRows.room(0, count), unknown, self.slow, False)
 
     @property
     def noise(self) -> float:
         """Present noise of most channels, in multiples of the stated noise."""
         return math.sqrt(self._known.lately["lasting"][0]) / self._sigma
+
+    def summary(self, rows: MeasuredRows | None, masked: NDArray[np.bool_], span: float) -> StreamReadings:
+        """Return the numbers of a block, and take it into the slow means.
+
+        Parameters
+        ----------
+        rows : MeasuredRows or None
+            NaN of what is missing, or what the model does not have.
+        masked : ndarray of bool, shape (channels,)
+            Sensors that are not to be trusted; their slow means begin anew.
+        span : float
+            Length (s) of the block that the slow means take; 0 if they are to leave it out.
+        """
+        if rows is None or not len(rows.stamps):
+            return self._nothing
+        columns = map(np.ascontiguousarray, rows)
+        is_bent = self._summarise(self._held, *columns, masked, min(1.0, span / WINDOW))
+        return StreamReadings(rows, self._known.means.copy(), self.slow, bool(is_bent))
 
     def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
         """Take the readings of a block.

@@ -37,20 +37,6 @@ class SlowMeans(NamedTuple):
     weight: Array
 
 
-@by_reference
-class ReadingsWork(NamedTuple):
-    """State of `summarise` for one stream.
-
-    stated : variance of the noise.
-    means : (2, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
-    slow : SlowMeans.
-    """
-
-    stated: float
-    means: Array
-    slow: SlowMeans
-
-
 LATELY = np.dtype([("first", float), ("noise", float), ("lasting", float)])
 """Time (s) of the first reading; usual variance of the noise, now and averaged."""
 BEFORE = 3  # readings before a block that `survey` and `find` take with it
@@ -58,7 +44,7 @@ BEFORE = 3  # readings before a block that `survey` and `find` take with it
 
 @by_reference
 class CheckWork(NamedTuple):
-    """State of `survey` for one stream.
+    """State of `survey` and `summarise` for one stream.
 
     stated : variance of the noise. patience : repetitions of a reading above which its sensor is stuck.
     lately : (1,) see `LATELY`.
@@ -66,6 +52,7 @@ class CheckWork(NamedTuple):
     heard : (channels,) time of the newest reading, s; NaN before the first.
     power, run, since : (channels,) variance of the noise, see `noise2_at`; repetitions of the newest reading; first stamp (s).
     missing, outside : (channels,) share of missing readings; number of readings of the newest block out of range.
+    means : (2, channels) of the newest block, see `boom_twin.health.sensor_check.StreamReadings`. slow : SlowMeans.
     """
 
     stated: float
@@ -79,6 +66,8 @@ class CheckWork(NamedTuple):
     since: Array
     missing: Array
     outside: Array
+    means: Array
+    slow: SlowMeans
 
 
 @inner
@@ -212,12 +201,12 @@ def go_on(sensors, times, raw, left, share):
 
 
 @kernel
-def summarise(work, stamps, raw, left, sigmas, masked, share):
+def summarise(sensors, stamps, raw, left, sigmas, masked, share):
     """Compute the numbers of a block of readings and update the slow means; return `is_bent`.
 
     Parameters
     ----------
-    work : ReadingsWork
+    sensors : CheckWork
     stamps, raw, left, sigmas : ndarray, shape (k,), (k, channels), (k, channels), (k, channels)
         See `boom_twin.health.blocks.MeasuredRows`; NaN where a reading is missing; k > 0.
     masked : ndarray of bool, shape (channels,)
@@ -225,7 +214,7 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
     share : float
         Weight of the block in the slow means.
     """
-    means, slow, last = work.means, work.slow, stamps.shape[0] - 1
+    means, slow, last = sensors.means, sensors.slow, stamps.shape[0] - 1
     span = (stamps[last] - stamps[0]) * NANO
     for i in range(raw.shape[1]):
         known, read, off, variance = 0, 0.0, 0.0, 0.0
@@ -249,11 +238,11 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
             slow.weight[i] += share * (1.0 - slow.weight[i])
         if math.isfinite(rate) and not masked[i]:
             slow.rate[i] += share * (rate - slow.rate[i])
-    return is_bent(work, raw, masked)
+    return is_bent(sensors.stated, raw, masked)
 
 
 @inner
-def is_bent(work, raw, masked):
+def is_bent(stated, raw, masked):
     """Return True if a channel that is not masked shows motion that is fast for the sampling rate.
 
     Its second differences exceed those of noise, and its third differences are smaller than those of noise.
@@ -265,7 +254,7 @@ def is_bent(work, raw, masked):
             power += bend2(raw, t, i)
         for t in range(3, count):
             rougher += rough2(raw, t, i)
-        is_quick = power > SHAKEN * work.stated * (count - 2)
+        is_quick = power > SHAKEN * stated * (count - 2)
         if is_quick and rougher < WHITE * power and not masked[i]:
             found = True
     return found
