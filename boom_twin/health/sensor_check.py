@@ -141,7 +141,7 @@ class SensorCheck:
         self.slow, unknown = SlowMeans(*np.zeros((5, count))), np.full((2, count), np.nan)
         self._known = CheckWork(
             stated=stated2,
-            patience=repeats(sigma, resolution),
+            patience=int(np.clip(readings_of_frozen(sigma, resolution, FALSE_ALARM) - 1.0, *REPEATS)),
             lately=np.array([(math.inf, stated2, stated2)], LATELY),
             low=low - margin,
             high=high + margin,
@@ -213,9 +213,3 @@ class SensorCheck:
             "dropout": flags[SILENT], "range": flags[OUTSIDE],
         }  # fmt: skip
         return SensorFindings(by_kind, jumped, left[-1].copy())
-
-
-def repeats(sigma: float, resolution: float) -> int:
-    """Return how often a live sensor repeats a reading with a probability below `FALSE_ALARM`, within `REPEATS`."""
-    least, most = REPEATS
-    return int(min(max(readings_of_frozen(sigma, resolution, FALSE_ALARM) - 1.0, least), most))
