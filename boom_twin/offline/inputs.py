@@ -107,7 +107,7 @@ class ReplayInputs:
 
 def of_another_boom(session: Session, scene: SessionScene, angles: str) -> BagError:
     """Return the error that a session is of another boom than its scene, by channels of angles."""
-    told = f"{session.path}: {angles} and the IMU agree with each other, and not with what the strokes say"
+    told = f"{session.path}: {angles or 'the angles'} and the IMU agree with each other, and not with what the strokes say"
     return BagError(f"{told}. The scene ({scene.source}) is of another boom. Give the boom's own by --scene.")
 
 
