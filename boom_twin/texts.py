@@ -53,6 +53,7 @@ SENTENCES = {
     "wiring": Sentence(
         "{thing} is wired otherwise than the mapping says", "Record slow moves, then run `boom_twin mapping --check`"
     ),
+    "wiring scene": Sentence("the scene is of another boom", "Give the scene of this boom"),
     "late": Sentence("stamps of {thing} are late", "Correct their delay in the mapping"),
     "late cylinder_strokes": Sentence("stamps of {thing} are late", "Give all other streams the negative delay in the mapping"),
     "deviation": Sentence("{thing} does not fit the cylinder lengths", "Compare both at rest, then set the zero"),

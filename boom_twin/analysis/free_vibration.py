@@ -22,13 +22,12 @@ DECAYS = 4.0  # deviations by which a vibration has to be damped: the line of a 
 
 @dataclass(frozen=True, slots=True)
 class Vibration:
-    """One mode: frequency (Hz) and damping ratio, with their standard deviations; amplitude at first, over all channels."""
+    """One mode: frequency (Hz) and damping ratio, with their standard deviations."""
 
     frequency: float
     frequency_sigma: float
     damping: float
     damping_sigma: float
-    amplitude: float
 
 
 def free_vibrations(dt: float, values: Array) -> list[Vibration]:
@@ -49,9 +48,9 @@ def free_vibrations(dt: float, values: Array) -> list[Vibration]:
     rates = rates[kept][np.argsort(frequencies[kept])]
     if not len(rates):
         return []
-    step, sigmas, amplitudes = _refined(dt * np.arange(float(len(x))), x, rates)
+    step, sigmas = _refined(dt * np.arange(float(len(x))), x, rates)
     rates = rates + np.where(np.abs(step) < longest_step * sigmas.max(axis=1), step, 0.0)
-    return [_vibration(*each) for each in zip(rates, sigmas, amplitudes, strict=True)]
+    return [_vibration(*each) for each in zip(rates, sigmas, strict=True)]
 
 
 def is_free(each: Vibration) -> bool:
@@ -59,8 +58,8 @@ def is_free(each: Vibration) -> bool:
     return each.damping > DECAYS * each.damping_sigma
 
 
-def _refined(times: Array, x: Array, rates: np.ndarray) -> tuple[np.ndarray, Array, Array]:
-    """A Gauss-Newton step (1/s) of every rate to least squares (modes,), deviations of its two parts (modes, 2), amplitudes."""
+def _refined(times: Array, x: Array, rates: np.ndarray) -> tuple[np.ndarray, Array]:
+    """A Gauss-Newton step (1/s) of every rate to least squares (modes,), and deviations of its two parts (modes, 2)."""
     waves = np.exp(rates[None, :] * times[:, None])
     linear = np.hstack([waves.real, -waves.imag, np.ones((len(times), 1))])
     amplitudes = np.linalg.lstsq(linear, x, rcond=None)[0]
@@ -77,7 +76,7 @@ def _refined(times: Array, x: Array, rates: np.ndarray) -> tuple[np.ndarray, Arr
     inverse = np.linalg.pinv(information, hermitian=True)
     step = (inverse @ np.tensordot(left, rest, axes=((0, 2), (0, 1)))).reshape(2, -1)
     sigmas = np.sqrt(np.maximum(noise * np.diag(inverse), 0.0)).reshape(2, -1).T * _coloured(times, rest, rates)[:, None]
-    return step[0] + 1j * step[1], sigmas, np.linalg.norm(complexes, axis=1)
+    return step[0] + 1j * step[1], sigmas
 
 
 def _coloured(times: Array, rest: Array, rates: np.ndarray) -> Array:
@@ -91,7 +90,7 @@ def _coloured(times: Array, rest: Array, rates: np.ndarray) -> Array:
     return np.asarray(np.sqrt(np.maximum(near @ power / np.maximum(near.sum(axis=1), 1) / usual, 1.0)))
 
 
-def _vibration(rate: complex, sigmas: Array, amplitude: float) -> Vibration:
+def _vibration(rate: complex, sigmas: Array) -> Vibration:
     size, (decay_sigma, turn_sigma) = float(abs(rate)), sigmas.tolist()
     damping, damping_sigma = float(-rate.real) / size, decay_sigma / size
-    return Vibration(size / (2.0 * pi), turn_sigma / (2.0 * pi), damping, damping_sigma, float(amplitude))
+    return Vibration(size / (2.0 * pi), turn_sigma / (2.0 * pi), damping, damping_sigma)

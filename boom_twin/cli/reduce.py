@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..scene import Scene
+from ..scene.block_reader import quantity
 from ..scene.load import default_text, read_text, with_end_mark
 from ..system.atomic_files import check_new, write_atomic
 from .arguments import add_file, files_of, refuse_given
@@ -19,9 +19,7 @@ if TYPE_CHECKING:
     from ..scene.edit import Edit
 
 
-UNITS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3}  # in m
 FORM = "give the error that the tip may have, like tip=1mm, tip=0.5cm or tip=0.001 (m)"
-NEED = re.compile(r"\s*(?P<what>\w*)\s*=\s*(?P<number>[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)\s*(?P<unit>[^\W\d]*)\s*")
 ANOTHER = "Another motion may differ: an error holds for the motion on which it was measured."
 FREE = "Damping and the compliance of cylinders cost no time, so they stay."
 MEANING = {
@@ -51,16 +49,16 @@ def refuse_misuse(args: Namespace) -> None:
 
 def tip_error(text: str) -> float:
     """Return the value of ``--need`` in m; raise ArgumentTypeError if it is not of the form ``tip=1mm``."""
-    match = NEED.fullmatch(text)
-    if match is None:
-        raise ArgumentTypeError(f"{text!r}: {FORM}")
-    if match["what"] != "tip":
+    what, _, size = text.partition("=")
+    value = quantity(size, "m")
+    try:
+        value = float(size) if value is None else value
+    except ValueError:
+        value = "a length is needed"
+    if what.strip() != "tip":
         raise ArgumentTypeError(f"{text!r}: only the error of the tip can be stated; {FORM}")
-    if match["unit"] not in UNITS:
-        raise ArgumentTypeError(f"{text!r}: the unit {match['unit']!r} is none of mm, cm, m; {FORM}")
-    value = float(match["number"]) * UNITS[match["unit"]]
-    if not (math.isfinite(value) and value > 0.0):
-        raise ArgumentTypeError(f"{text!r}: the error must be positive and finite; {FORM}")
+    if isinstance(value, str) or not 0.0 < value < math.inf:
+        raise ArgumentTypeError(f"{text!r}: {value if isinstance(value, str) else 'it must be positive and finite'}; {FORM}")
     return value
 
 

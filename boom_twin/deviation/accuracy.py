@@ -16,7 +16,7 @@ from ..config.settings import Settings
 from ..kernels.jit import kernel
 from ..kernels.result_row import results_in
 from ..scene.schema import Scene
-from ..types import NO_PLACES, SECOND, SENSORS, Array, Mount, Place, Stream, StrokeReading
+from ..types import NO_PLACES, SECOND, SENSORS, Array, Place, Stream, StrokeReading
 from .estimate_row import ACCELERATION_COVARIANCE, FORCE_VARIANCE, TIP_COVARIANCE, VARIANCES, WIDTH
 from .predictor import BoomPredictor
 from .sensors import take_sensor
@@ -24,7 +24,7 @@ from .step import step_lengths
 from .tip_estimate import write_tip_estimate
 
 SETTLED = 20.0  # s
-POINT_RATE = 1.0  # Hz, of a total station
+RATE, POINT_RATE = 200.0, 1.0  # Hz, of all sensors but a total station
 
 
 class TipAccuracy(NamedTuple):
@@ -40,8 +40,6 @@ def accuracy_at(
     drives: Array,
     sensors: Sequence[Stream],
     settings: Settings | None = None,
-    mounts: Sequence[Mount | None] = (),
-    rate: float = 200.0,
     reads: StrokeReading = StrokeReading.LENGTH,
     places: Mapping[str, Place] = NO_PLACES,
 ) -> TipAccuracy:
@@ -54,9 +52,7 @@ def accuracy_at(
     drives : ndarray, shape (n,)
         Strokes of the drives, m.
     sensors : sequence of Stream
-        Beside what drives the model; one that is named twice is there twice.
-    rate : float
-        Of all of them, Hz; positions of points come at `POINT_RATE`.
+        Beside what drives the model; one that is named twice is there twice. All read at `RATE`, points at `POINT_RATE`.
     reads : StrokeReading
         What drives the model.
     places : mapping of str to Place
@@ -67,17 +63,17 @@ def accuracy_at(
     UsageError, SolverError
         Strokes out of reach; no equilibrium there.
     """
-    boom = BoomPredictor(scene, settings or Settings(), mounts, reads, places)
+    boom = BoomPredictor(scene, settings or Settings(), (), reads, places)
     driving = boom.finder.readings_at(statics(scene, drives).lengths)
     boom.start(driving)
     widths = [len(names) for stream, names in boom.channels.items() if stream is not Stream.STROKES]
     counts = np.array([sum(each is stream for each in sensors) for stream in Stream])
     counts[list(Stream).index(Stream.MOMENTS)] = min(1, sum(each is Stream.MOMENTS for each in sensors))  # all at once
-    every = np.array([round(rate / POINT_RATE) if SENSORS[stream].field == "point" else 1 for stream in Stream])
+    every = np.array([round(RATE / POINT_RATE) if SENSORS[stream].field == "point" else 1 for stream in Stream])
     first, zeros, out = np.cumsum([0, 0, *widths]), np.zeros(max(widths)), np.zeros(WIDTH)
     tables, anchor, live, work, posture, filters, _, row = boom.compiled
     filters.load2[:] = filters.noise.usual_load**2
-    span, steps, gravity = round(SECOND / rate), round(SETTLED * rate), np.array(boom.plan.tables.gravity)
+    span, steps, gravity = round(SECOND / RATE), round(SETTLED * RATE), np.array(boom.plan.tables.gravity)
     settle_covariance(
         tables, anchor, live, work, posture, filters, row, driving, gravity, counts, every, first, zeros, span, steps, out
     )

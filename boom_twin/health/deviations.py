@@ -14,7 +14,7 @@ from ..types import NANO, SENSORS, Alarm, Array, Stream, channels_of
 from ..wiring.readings import LONGEST
 from .alarms import change_text
 from .blocks import Block
-from .stream_readings import ENOUGH, WINDOW, StreamReadings
+from .sensor_check import ENOUGH, WINDOW, StreamReadings
 
 KIND = "deviation"  # kind of all its alarms
 SIGMAS = {Stream.ANGLES: 3.0, Stream.FORCES: 10.0}
@@ -62,7 +62,7 @@ class DeviationMonitor:
         if not self._last and not (np.abs(off) > self._limits).any():
             self._since[:] = -1
             return []
-        is_known = (readings.counts > 0.0) & (slow.weight > ENOUGH) & ~masked
+        is_known = np.isfinite(readings.means[0]) & (slow.weight > ENOUGH) & ~masked
         least = np.maximum(self._limits, SIGMAS[self._stream] * np.sqrt(slow.variance / weight))
         is_far, is_near = is_known & (np.abs(off) > least), is_known & (np.abs(off) < GONE * self._limits)
         is_explained = np.abs(off) < LONGEST * np.abs(slow.rate) / weight + least  # by a lag, see `lag_monitor`

@@ -17,7 +17,7 @@ from ..types import NANO, SENSORS, Alarm, Array, Stream
 from ..wiring.readings import CLEAR, SPAN, Lag, lag_near
 from .alarms import change_text
 from .blocks import BLOCK, Block
-from .stream_readings import StreamReadings
+from .sensor_check import StreamReadings
 
 LEAST = 0.025  # s, lag from which on it is an alarm: a payload or a spring that is wrong shifts vibration by less
 SIGMAS = 10.0  # standard deviations that a lag has at least: before it has been so for a while its size is a mixture

@@ -15,9 +15,8 @@ from .causes import explains
 from .deviations import SIGMAS, DeviationMonitor
 from .fault_twins import FaultTwins
 from .lag_monitor import LagMonitor
-from .sensor_check import NOISE_OVER, SensorCheck, sensor_ranges
+from .sensor_check import NOISE_OVER, SensorCheck, StreamReadings, sensor_ranges
 from .sensor_monitor import SensorMonitor
-from .stream_readings import StreamReadings, StreamSurvey
 from .tip_load import TipLoadMonitor
 from .wiring_monitor import WiringMonitor
 
@@ -73,6 +72,7 @@ class HealthMonitor:
             for stream, names in self._channels.items()
             if stream is not Stream.STROKES or stream is self._drive
         }
+        self._measured: list[Stream] = [stream for stream in self._channels if stream is not Stream.STROKES]
         self._imus = [stream for stream in self._channels if SENSORS[stream].is_accelerometer]
         self._lags = LagMonitor(self._drive)
         compared = [stream for stream in SIGMAS if stream is not self._drive]
@@ -90,11 +90,6 @@ class HealthMonitor:
             stream: SensorCheck(*settings.noise(kind), *self._ranges[stream], fastest.get(stream, 0.0))
             for stream, kind in SENSORS.items()
             if stream in self._sensors
-        }
-        self._surveys: dict[Stream, StreamSurvey] = {
-            stream: StreamSurvey(settings.variance(SENSORS[stream]), len(names))
-            for stream, names in self._channels.items()
-            if stream is not Stream.STROKES
         }
         for sensors in self._sensors.values():
             sensors.begin()
@@ -117,9 +112,9 @@ class HealthMonitor:
         Those are the channels of sensors and streams that are known to fail. An IMU is used once its mean is known, for no
         noise tells that its axes are wrong.
         """
-        unknown = {stream for stream in self._imus if self._surveys[stream].slow.weight.max() < KNOWN}
+        unknown = {stream for stream in self._imus if self._checks[stream].slow.weight.max() < KNOWN}
         return np.concatenate(
-            [self._masked(stream) | self._wiring.doubted(stream) | (stream in unknown) for stream in self._surveys]
+            [self._masked(stream) | self._wiring.doubted(stream) | (stream in unknown) for stream in self._measured]
         )
 
     @property
@@ -182,10 +177,10 @@ class HealthMonitor:
         predictions, news = block.predictions(), list[Alarm]()
         is_followed = bool(predictions.variances.max() < self._uncertain)
         span, readings = BLOCK * NANO if is_followed else 0.0, dict[Stream, StreamReadings]()
-        for stream, survey in self._surveys.items():
-            if stream is self._drive:
-                continue
-            readings[stream] = survey.take(block.readings(stream), self._sensors[stream].masked, span)
+        for stream in self._measured:
+            if stream is not self._drive:
+                rows = block.readings(stream)
+                readings[stream] = self._checks[stream].summary(rows, self._sensors[stream].masked, span)
         for stream, each in readings.items():
             stamps, raw, left, _ = each.rows
             expected = raw - left if is_followed else np.full(raw.shape, np.nan)
@@ -223,5 +218,6 @@ class HealthMonitor:
 def warm_up() -> None:
     """Compile the kernels that judge a rig, on made-up readings of two channels."""
     two = np.zeros((2, 2))
-    SensorCheck(1.0, 0.0, two[0], two[0], 0.0).look(np.arange(2.0), two + 100.0, two, 2.0)
-    StreamSurvey(1.0, 2).take(MeasuredRows(np.arange(2), two, two, two), np.zeros(2, dtype=bool), 1.0)
+    check = SensorCheck(1.0, 0.0, two[0], two[0], 0.0)
+    check.look(np.arange(2.0), two + 100.0, two, 2.0)
+    check.summary(MeasuredRows(np.arange(2), two, two, two), np.zeros(2, dtype=bool), 1.0)

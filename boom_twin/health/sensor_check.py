@@ -1,4 +1,4 @@
-"""Check the readings of single sensors, block by block: stuck, noisy, spikes, jumps, silence, readings out of range."""
+"""Check the readings of a stream, block by block: stuck, noisy, spikes, jumps, silence, out of range; means, motion."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from ..kernels.jit import SameTypes, hold
 from ..scene.schema import Scene
 from ..types import GIVE, Array, Mount, Stream, channels_of
-from .sensor_findings import FALSE_ALARM, OUTLIER, OUTSIDE, SILENT, SPIKES, STUCK, find
+from .blocks import MeasuredRows
+from .sensor_findings import FALSE_ALARM, OUTSIDE, SILENT, SPIKES, STUCK, find
 from .sensor_findings import NOISY as IS_NOISY
-from .sensor_survey import LATELY, ROOM, CheckLimits, CheckWork, survey
+from .sensor_survey import BEFORE, LATELY, NOISY, NOISY_WINDOW, SILENT_FOR, CheckWork, SlowMeans, summarise, survey
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -50,15 +51,12 @@ def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> f
 
 Flags = NDArray[np.bool_]
 
-NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
 JERK = 3.0  # m/s^3 of a cylinder in haste, which is no noise of its sensor: 0.2 m in 1.6 s
-USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
 NOISE_OVER = "noise_over_"  # and the name of a setting: how its figures are called
-MEASURED = 4.0  # times the stated noise, above which there may be more: a reading counts for so much at most
 MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
+WINDOW = 2.0  # s, time constant of the slow means
+ENOUGH = 0.6  # weight of slow means that are judged: after 1.8 s
 REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to repeat
-SILENT_FOR = 0.5  # s; readings that lie farther apart are no neighbours: neither jumps nor spikes show across such a gap
-MISSING = 0.1  # share of the readings
 
 
 def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, tuple[Array, Array]]:
@@ -99,6 +97,26 @@ class SensorFindings(NamedTuple):
     level: Array
 
 
+class StreamReadings(NamedTuple):
+    """A block of k readings.
+
+    Attributes
+    ----------
+    rows : MeasuredRows
+    means : ndarray, shape (2, channels)
+        Means of readings that the model has something to compare with, and of the expected ones; NaN of none.
+    slow : SlowMeans
+    is_bent : bool
+        True if trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by second and
+        by third differences, motion much less by third ones.
+    """
+
+    rows: MeasuredRows
+    means: Array
+    slow: SlowMeans
+    is_bent: bool
+
+
 class SensorCheck:
     """Check of the readings of one stream, block by block.
 
@@ -110,24 +128,21 @@ class SensorCheck:
         Their range.
     fastest : float
         What the quantity may change by, per s: more is a jump of the sensor. 0 where a jump is judged by the noise alone.
+
+    Attributes
+    ----------
+    slow : SlowMeans
     """
 
     def __init__(self, sigma: float, resolution: float, low: Array, high: Array, fastest: float) -> None:
         self._sigma = math.sqrt(sigma**2 + resolution**2 / 12.0)
         self._fastest = fastest
-        count, rows = len(low), 3 + ROOM
-        margin, stated2 = 5.0 * self._sigma, self._sigma**2
-        limits = CheckLimits(
-            gap=SILENT_FOR, cut=(MEASURED * NOISY) ** 2 * stated2, stated=stated2, window=NOISY_WINDOW,
-            long_window=USUAL_WINDOW, leap=OUTLIER * self._sigma, loud=NOISY**2, loudest_usual=NOISY**2 * stated2, lack=MISSING,
-            patience=repeats(sigma, resolution),
-        )  # fmt: skip
+        count, margin, stated2 = len(low), 5.0 * self._sigma, self._sigma**2
+        self.slow, unknown = SlowMeans(*np.zeros((5, count))), np.full((2, count), np.nan)
         self._known = CheckWork(
-            limits=limits,
-            lately=np.array([(math.inf, 0, stated2, stated2)], LATELY),
-            times=np.zeros(rows),
-            raw=np.full((rows, count), np.nan),
-            left=np.full((rows, count), np.nan),
+            stated=stated2,
+            patience=int(np.clip(readings_of_frozen(sigma, resolution, FALSE_ALARM) - 1.0, *REPEATS)),
+            lately=np.array([(math.inf, stated2, stated2)], LATELY),
             low=low - margin,
             high=high + margin,
             heard=np.full(count, np.nan),
@@ -136,15 +151,37 @@ class SensorCheck:
             since=np.zeros(count),
             missing=np.zeros(count),
             outside=np.zeros(count),
+            means=unknown.copy(),
+            slow=self.slow,
         )
         self._held = hold(self._known)
-        self._survey, self._find, self._column = SameTypes(survey), SameTypes(find), np.zeros(rows)
+        self._survey, self._find, self._summarise = SameTypes(survey), SameTypes(find), SameTypes(summarise)
+        self._newest = np.zeros(BEFORE), *np.full((2, BEFORE, count), np.nan)  # stamps (s), readings, residuals
         self._calm = SensorFindings({}, np.zeros(count), np.full(count, np.nan))
+        self._nothing = StreamReadings(MeasuredRows.room(0, count), unknown, self.slow, False)
 
     @property
     def noise(self) -> float:
         """Present noise of most channels, in multiples of the stated noise."""
         return math.sqrt(self._known.lately["lasting"][0]) / self._sigma
+
+    def summary(self, rows: MeasuredRows | None, masked: NDArray[np.bool_], span: float) -> StreamReadings:
+        """Return the numbers of a block, and take it into the slow means.
+
+        Parameters
+        ----------
+        rows : MeasuredRows or None
+            NaN of what is missing, or what the model does not have.
+        masked : ndarray of bool, shape (channels,)
+            Sensors that are not to be trusted; their slow means begin anew.
+        span : float
+            Length (s) of the block that the slow means take; 0 if they are to leave it out.
+        """
+        if rows is None or not len(rows.stamps):
+            return self._nothing
+        columns = map(np.ascontiguousarray, rows)
+        is_bent = self._summarise(self._held, *columns, masked, min(1.0, span / WINDOW))
+        return StreamReadings(rows, self._known.means.copy(), self.slow, bool(is_bent))
 
     def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
         """Take the readings of a block.
@@ -158,35 +195,21 @@ class SensorCheck:
         now : float
             End of the block, s.
         """
-        rows = len(stamps)
-        if not rows:
+        if not len(stamps):
             silent = now - self._known.heard > SILENT_FOR
             return self._calm._replace(flags={"dropout": silent}) if silent.any() else self._calm
-        self._make_room(3 + rows)
-        known = self._known
-        largest = self._survey(self._held, stamps, np.ascontiguousarray(raw), np.ascontiguousarray(expected))
-        interval = (known.times[2 + rows] - known.times[2]) / rows
+        pairs = zip(self._newest, (stamps, raw, raw - expected), strict=True)
+        times, raw, left = rows = tuple(np.ascontiguousarray(np.concatenate(pair)) for pair in pairs)
+        self._newest = tuple(each[-BEFORE:] for each in rows)
+        known, largest = self._known, self._survey(self._held, *rows)
+        interval = (times[-1] - times[BEFORE - 1]) / len(stamps)
         is_motion = self._fastest > 0.0 and JERK * interval**3 > NOISY * self._sigma  # what bends readings so much
         is_known = bool(now - known.lately["first"][0] > NOISY_WINDOW and not is_motion)  # how noisy the sensors are
         flags, jumped = np.empty((5, len(known.power)), dtype=bool), np.empty(len(known.power))
-        if not self._find(self._held, largest, now, is_known, self._fastest, self._column, flags, jumped):
+        if not self._find(self._held, *rows, largest, now, is_known, self._fastest, np.empty_like(times), flags, jumped):
             return self._calm
         by_kind = {
             "stuck": flags[STUCK], "noise": flags[IS_NOISY], "spikes": flags[SPIKES], "jump": jumped != 0.0,
             "dropout": flags[SILENT], "range": flags[OUTSIDE],
         }  # fmt: skip
-        return SensorFindings(by_kind, jumped, known.left[2 + rows].copy())
-
-    def _make_room(self, rows: int) -> None:
-        """Make room for `rows` readings, including the newest three before the block."""
-        known = self._known
-        if rows > len(known.times):
-            times, raw, left = (np.resize(each, (2 * rows, *each.shape[1:])) for each in (known.times, known.raw, known.left))
-            self._known, self._column = known._replace(times=times, raw=raw, left=left), np.zeros(2 * rows)
-            self._held = hold(self._known)
-
-
-def repeats(sigma: float, resolution: float) -> int:
-    """Return how often a live sensor repeats a reading with a probability below `FALSE_ALARM`, within `REPEATS`."""
-    least, most = REPEATS
-    return int(min(max(readings_of_frozen(sigma, resolution, FALSE_ALARM) - 1.0, least), most))
+        return SensorFindings(by_kind, jumped, left[-1].copy())

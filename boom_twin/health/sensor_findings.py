@@ -6,23 +6,25 @@ import math
 from statistics import NormalDist
 
 from ..kernels.jit import inner, kernel
-from .sensor_survey import loud, noise2_at
+from .sensor_survey import BEFORE, SILENT_FOR, loud, noise2_at
 
 STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
 FALSE_ALARM = 1e-12  # probability, for each reading, of a finding in white noise
 OUTLIER = -math.sqrt(2.0) * NormalDist().inv_cdf(0.5 * FALSE_ALARM)  # difference of two readings, over their noise
 QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
+MISSING = 0.1  # share of the readings
 REPEATS_FOR = 0.4  # s, at least, of one reading again and again
 ENOUGH, MEDIAN2 = 6, 0.4549  # third differences whose median tells noise; that of the square of a standard normal value
 
 
 @kernel
-def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
+def find(sensors, times, raw, left, largest, now, is_known, fastest, column, flags, jumped):
     """Write the findings in the block that `boom_twin.health.sensor_survey.survey` took; return True if there is any.
 
     Parameters
     ----------
-    sensors : CheckWork
+    sensors, times, raw, left
+        See `survey`.
     largest : float
         Change of `left` from one reading to the next, see `survey`.
     now : float
@@ -38,18 +40,18 @@ def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
     jumped : ndarray, shape (channels,)
         Written: how far readings changed from one to the next, for good, while the model did not; 0 where they did not.
     """
-    limits, power, count = sensors.limits, sensors.power, 3 + sensors.lately[0].rows
-    live, newest, found = is_any_live(sensors), sensors.times[count - 1], False
+    power, count = sensors.power, times.shape[0]
+    live, newest, found = is_any_live(sensors), times[count - 1], False
     for i in range(power.shape[0]):
         is_spiky, jumped[i] = False, 0.0
-        if largest > limits.leap:
-            least = OUTLIER * noise_of(sensors, count, i, column)
-            is_spiky, jumped[i] = has_spikes(sensors, count, i, least), jump(sensors, count, i, least, fastest)
-        flags[STUCK, i] = live and sensors.run[i] >= limits.patience and newest - sensors.since[i] >= REPEATS_FOR
+        if largest > OUTLIER * math.sqrt(sensors.stated):
+            least = OUTLIER * noise_of(sensors, times, left, i, column)
+            is_spiky, jumped[i] = has_spikes(times, left, i, least), jump(times, raw, left, i, least, fastest)
+        flags[STUCK, i] = live and sensors.run[i] >= sensors.patience and newest - sensors.since[i] >= REPEATS_FOR
         flags[NOISY, i] = is_known and power[i] > loud(sensors)
         flags[SPIKES, i] = is_known and is_spiky
-        flags[SILENT, i] = now - sensors.heard[i] > limits.gap or sensors.missing[i] > limits.lack
-        flags[OUTSIDE, i] = sensors.outside[i] > 0.5 * (count - 3)
+        flags[SILENT, i] = now - sensors.heard[i] > SILENT_FOR or sensors.missing[i] > MISSING
+        flags[OUTSIDE, i] = sensors.outside[i] > 0.5 * (count - BEFORE)
         found = found or jumped[i] != 0.0
         for kind in range(5):
             found = found or flags[kind, i]
@@ -59,7 +61,7 @@ def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
 @inner
 def is_any_live(sensors):
     """Return True if a channel of several is alive with noise."""
-    power, least = sensors.power, QUIET * math.sqrt(sensors.limits.stated)
+    power, least = sensors.power, QUIET * math.sqrt(sensors.stated)
     live = False
     for i in range(power.shape[0] if power.shape[0] > 1 else 0):
         live = live or power[i] > least * least
@@ -67,17 +69,17 @@ def is_any_live(sensors):
 
 
 @inner
-def noise_of(sensors, count, i, column):
+def noise_of(sensors, times, left, i, column):
     """Return the noise of channel i: as measured over time, by the median of third differences, or as stated.
 
     That median does not wait for the noise to be measured, as a mean over time does, and one spike leaves it as it is. A sensor
     that has twice the stated noise gives no spikes by that.
     """
-    variance, size = sensors.limits.stated, 0
+    variance, size = sensors.stated, 0
     if sensors.power[i] > variance:
         variance = sensors.power[i]
-    for t in range(3, count):
-        size = sorted_in(column, size, noise2_at(sensors.times, sensors.left, t, i))
+    for t in range(BEFORE, times.shape[0]):
+        size = sorted_in(column, size, noise2_at(times, left, t, i))
     if size >= ENOUGH:
         variance = max(variance, column[(size - 1) // 2] / MEDIAN2)
     return math.sqrt(variance)
@@ -97,29 +99,29 @@ def sorted_in(column, size, value):
 
 
 @inner
-def step(sensors, t, i):
+def step(times, left, t, i):
     """Return the change of the residual to reading t of channel i from the one before; NaN across a gap."""
-    if sensors.times[t] - sensors.times[t - 1] > sensors.limits.gap:
+    if times[t] - times[t - 1] > SILENT_FOR:
         return math.nan
-    return sensors.left[t, i] - sensors.left[t - 1, i]
+    return left[t, i] - left[t - 1, i]
 
 
 @inner
-def has_spikes(sensors, count, i, least):
+def has_spikes(times, left, i, least):
     """Return True if a reading of channel i leaves both neighbours the same way by more than `least`, while these agree."""
-    for t in range(1, count - 1):
-        out, back = step(sensors, t, i), -step(sensors, t + 1, i)
+    for t in range(1, times.shape[0] - 1):
+        out, back = step(times, left, t, i), -step(times, left, t + 1, i)
         if out * back > 0.0 and abs(out) > least and abs(back) > least and abs(out - back) < 0.5 * min(abs(out), abs(back)):
             return True
     return False
 
 
 @inner
-def jump(sensors, count, i, least, fastest):
+def jump(times, raw, left, i, least, fastest):
     """Return how far readings of channel i changed at once by more than `least` and more than `fastest` allows, for good."""
-    raw, left, times, total = sensors.raw, sensors.left, sensors.times, 0.0
-    for t in range(2, count - 1):
-        change = step(sensors, t, i)
+    total = 0.0
+    for t in range(2, times.shape[0] - 1):
+        change = step(times, left, t, i)
         most = max(least, fastest * (times[t] - times[t - 1]))
         if not (abs(change) > most and abs(raw[t, i] - raw[t - 1, i]) > most):
             continue

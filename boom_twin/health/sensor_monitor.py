@@ -14,7 +14,8 @@ import numpy as np
 
 from ..types import NANO, SENSORS, Alarm, Array, Stream
 from .alarms import change_text
-from .sensor_check import MEASURED, MISSTATED, NOISE_OVER, Flags, SensorFindings
+from .sensor_check import MISSTATED, NOISE_OVER, Flags, SensorFindings
+from .sensor_survey import MEASURED
 
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended
 AGAIN = 60_000_000_000  # ns between failures of one intermittent contact

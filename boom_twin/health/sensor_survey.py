@@ -13,7 +13,10 @@ from ..types import NANO, Array
 
 Integers = NDArray[np.int64]
 
-ROOM = 32  # readings of a block for which callers allocate memory at first
+NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
+USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
+MEASURED = 4.0  # times the stated noise, above which there may be more: a reading counts for so much at most
+SILENT_FOR = 0.5  # s; readings that lie farther apart are no neighbours: neither jumps nor spikes show across such a gap
 SHAKEN = 3.0  # multiple of the stated variance above which second differences show motion
 WHITE = 0.75  # ratio of third to second differences below which they show motion, not noise
 
@@ -34,65 +37,27 @@ class SlowMeans(NamedTuple):
     weight: Array
 
 
-@by_reference
-class ReadingsWork(NamedTuple):
-    """State of `summarise` for one stream.
-
-    stated : variance of the noise.
-    counts, means : (channels,), (2, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
-    slow : SlowMeans.
-    """
-
-    stated: float
-    counts: Array
-    means: Array
-    slow: SlowMeans
-
-
-@by_reference
-class CheckLimits(NamedTuple):
-    """Limits of `survey` and `find`.
-
-    gap : time (s) between readings above which they are not compared. cut : largest variance that one outlier adds. stated :
-    variance of the noise. window, long_window : averaging times (s) of a channel's noise and of the usual noise. Findings need
-    more than these: leap, change between two readings; loud, multiple of the usual variance, bounded by loudest_usual; lack,
-    share of missing readings; patience, repetitions of a reading.
-    """
-
-    gap: float
-    cut: float
-    stated: float
-    window: float
-    long_window: float
-    leap: float
-    loud: float
-    loudest_usual: float
-    lack: float
-    patience: int
-
-
-LATELY = np.dtype([("first", float), ("rows", np.int64), ("noise", float), ("lasting", float)])
-"""Time (s) of the first reading; readings in the newest block; usual variance of the noise, now and averaged."""
+LATELY = np.dtype([("first", float), ("noise", float), ("lasting", float)])
+"""Time (s) of the first reading; usual variance of the noise, now and averaged."""
+BEFORE = 3  # readings before a block that `survey` and `find` take with it
 
 
 @by_reference
 class CheckWork(NamedTuple):
-    """State of `survey` for one stream.
+    """State of `survey` and `summarise` for one stream.
 
+    stated : variance of the noise. patience : repetitions of a reading above which its sensor is stuck.
     lately : (1,) see `LATELY`.
-    times, raw, left : (3 + k,), (3 + k, channels), (3 + k, channels) stamps (s), readings, residuals. The newest three before
-    the block are first.
     low, high : (channels,) the range of the sensors.
     heard : (channels,) time of the newest reading, s; NaN before the first.
     power, run, since : (channels,) variance of the noise, see `noise2_at`; repetitions of the newest reading; first stamp (s).
     missing, outside : (channels,) share of missing readings; number of readings of the newest block out of range.
+    means : (2, channels) of the newest block, see `boom_twin.health.sensor_check.StreamReadings`. slow : SlowMeans.
     """
 
-    limits: CheckLimits
+    stated: float
+    patience: int
     lately: NDArray[np.void]
-    times: Array
-    raw: Array
-    left: Array
     low: Array
     high: Array
     heard: Array
@@ -101,6 +66,8 @@ class CheckWork(NamedTuple):
     since: Array
     missing: Array
     outside: Array
+    means: Array
+    slow: SlowMeans
 
 
 @inner
@@ -137,47 +104,35 @@ def noise2_at(times, values, t, i):
 
 
 @kernel
-def survey(sensors, stamps, raw, expected):
+def survey(sensors, times, raw, left):
     """Take a block of readings, and update the statistics of every channel.
 
     Parameters
     ----------
     sensors : CheckWork
         Updated with the block.
-    stamps, raw, expected : ndarray, shape (k,), (k, channels), (k, channels)
-        Stamps (s), readings, readings by the model; k > 0.
+    times, raw, left : ndarray, shape (3 + k,), (3 + k, channels), (3 + k, channels)
+        Stamps (s), readings, residuals; the newest `BEFORE` before the block are first; k > 0.
 
     Returns
     -------
     float
         Largest change of `left` between two readings, except across a gap.
     """
-    limits, lately, rows = sensors.limits, sensors.lately[0], stamps.shape[0]
-    keep_newest(sensors)
-    lately.rows = rows
-    if not lately.first <= stamps[0]:
-        lately.first = stamps[0]
-    span = max(stamps[rows - 1] - stamps[0], 1e-3)
-    largest = go_on(sensors, stamps, raw, expected, min(1.0, span / limits.window))
-    lately.noise = usual_power(sensors.power, limits.stated)
-    lately.lasting += min(1.0, span / limits.long_window) * (lately.noise - lately.lasting)
+    lately, begin = sensors.lately[0], times[BEFORE]
+    if not lately.first <= begin:
+        lately.first = begin
+    span = max(times[times.shape[0] - 1] - begin, 1e-3)
+    largest = go_on(sensors, times, raw, left, min(1.0, span / NOISY_WINDOW))
+    lately.noise = usual_power(sensors.power, sensors.stated)
+    lately.lasting += min(1.0, span / USUAL_WINDOW) * (lately.noise - lately.lasting)
     return largest
 
 
 @inner
 def loud(sensors):
     """Return the variance of the noise above which a channel is noisy."""
-    return sensors.limits.loud * min(sensors.lately[0].noise, sensors.limits.loudest_usual)
-
-
-@inner
-def keep_newest(sensors):
-    """Move the newest three readings to the front."""
-    rows = sensors.lately[0].rows
-    for t in range(3):
-        sensors.times[t] = sensors.times[rows + t]
-        for i in range(sensors.raw.shape[1]):
-            sensors.raw[t, i], sensors.left[t, i] = sensors.raw[rows + t, i], sensors.left[rows + t, i]
+    return NOISY**2 * min(sensors.lately[0].noise, NOISY**2 * sensors.stated)
 
 
 @inner
@@ -203,44 +158,39 @@ def usual_power(power, stated):
 
 
 @inner
-def go_on(sensors, stamps, raw, expected, share):
+def go_on(sensors, times, raw, left, share):
     """Take the readings of a block, with weight `share` in the averages; return the largest change of `left` within gaps."""
-    times, all_raw, left, count = sensors.times, sensors.raw, sensors.left, 3 + stamps.shape[0]
-    gap, cut, variance = sensors.limits.gap, sensors.limits.cut, sensors.limits.stated
+    variance, cut = sensors.stated, (MEASURED * NOISY) ** 2 * sensors.stated
     power, run, missing, outside = sensors.power, sensors.run, sensors.missing, sensors.outside
-    for t in range(3, count):
-        times[t] = stamps[t - 3]
-    largest = 0.0
+    count, largest = times.shape[0], 0.0
     for i in range(power.shape[0]):
         total, known, lacking, newest, outside[i] = 0.0, 0, 0, -1, 0.0
-        for t in range(3, count):
-            all_raw[t, i], left[t, i] = raw[t - 3, i], raw[t - 3, i] - expected[t - 3, i]
         for t in range(1, count):
             step = abs(left[t, i] - left[t - 1, i])
-            if times[t] - times[t - 1] <= gap and step > largest:
+            if times[t] - times[t - 1] <= SILENT_FOR and step > largest:
                 largest = step
-            if t < 3:
+            if t < BEFORE:
                 continue
             noise2 = noise2_at(times, left, t, i)
             if not math.isnan(noise2):
                 total += min(noise2, cut)
                 known += 1
-            if math.isnan(all_raw[t, i]):
+            if math.isnan(raw[t, i]):
                 lacking += 1
-            elif all_raw[t, i] < sensors.low[i] or all_raw[t, i] > sensors.high[i]:
+            elif raw[t, i] < sensors.low[i] or raw[t, i] > sensors.high[i]:
                 outside[i] += 1.0
-            if all_raw[t, i] == all_raw[t - 1, i]:
+            if raw[t, i] == raw[t - 1, i]:
                 run[i] += 1
-            elif math.isfinite(all_raw[t, i]):
+            elif math.isfinite(raw[t, i]):
                 run[i], sensors.since[i] = 0, times[t]
-            if math.isfinite(all_raw[t, i]):
+            if math.isfinite(raw[t, i]):
                 newest = t
         if newest >= 0:
             if not times[newest] <= sensors.heard[i]:
                 sensors.heard[i] = times[newest]
         elif math.isnan(sensors.heard[i]):
-            sensors.heard[i] = times[3]
-        missing[i] += share * (lacking / (count - 3) - missing[i])
+            sensors.heard[i] = times[BEFORE]
+        missing[i] += share * (lacking / (count - BEFORE) - missing[i])
         if known > 0:
             heard = total / known
             if math.isnan(power[i]):
@@ -251,12 +201,12 @@ def go_on(sensors, stamps, raw, expected, share):
 
 
 @kernel
-def summarise(work, stamps, raw, left, sigmas, masked, share):
+def summarise(sensors, stamps, raw, left, sigmas, masked, share):
     """Compute the numbers of a block of readings and update the slow means; return `is_bent`.
 
     Parameters
     ----------
-    work : ReadingsWork
+    sensors : CheckWork
     stamps, raw, left, sigmas : ndarray, shape (k,), (k, channels), (k, channels), (k, channels)
         See `boom_twin.health.blocks.MeasuredRows`; NaN where a reading is missing; k > 0.
     masked : ndarray of bool, shape (channels,)
@@ -264,7 +214,7 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
     share : float
         Weight of the block in the slow means.
     """
-    counts, means, slow, last = work.counts, work.means, work.slow, stamps.shape[0] - 1
+    means, slow, last = sensors.means, sensors.slow, stamps.shape[0] - 1
     span = (stamps[last] - stamps[0]) * NANO
     for i in range(raw.shape[1]):
         known, read, off, variance = 0, 0.0, 0.0, 0.0
@@ -274,7 +224,7 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
                 read += raw[t, i]
                 off += left[t, i]
                 variance += sigmas[t, i] * sigmas[t, i]
-        counts[i], means[:, i] = known, math.nan
+        means[:, i] = math.nan
         if known > 0:
             means[0, i], means[1, i] = read / known, (read - off) / known
         rate = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span if span > 0.0 else math.nan
@@ -288,11 +238,11 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
             slow.weight[i] += share * (1.0 - slow.weight[i])
         if math.isfinite(rate) and not masked[i]:
             slow.rate[i] += share * (rate - slow.rate[i])
-    return is_bent(work, raw, masked)
+    return is_bent(sensors.stated, raw, masked)
 
 
 @inner
-def is_bent(work, raw, masked):
+def is_bent(stated, raw, masked):
     """Return True if a channel that is not masked shows motion that is fast for the sampling rate.
 
     Its second differences exceed those of noise, and its third differences are smaller than those of noise.
@@ -304,7 +254,7 @@ def is_bent(work, raw, masked):
             power += bend2(raw, t, i)
         for t in range(3, count):
             rougher += rough2(raw, t, i)
-        is_quick = power > SHAKEN * work.stated * (count - 2)
+        is_quick = power > SHAKEN * stated * (count - 2)
         if is_quick and rougher < WHITE * power and not masked[i]:
             found = True
     return found

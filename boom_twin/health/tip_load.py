@@ -11,7 +11,7 @@ from dataclasses import replace
 from ..types import NANO, Alarm, Array, Ranked
 from .alarms import change_text
 from .deviations import SETTLED
-from .stream_readings import WINDOW
+from .sensor_check import WINDOW
 
 CAUSE = "tip.load"
 CERTAIN = 3.0  # standard deviations by which a force is above the limit, or contradicts the lengths

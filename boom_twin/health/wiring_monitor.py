@@ -22,6 +22,7 @@ from .alarms import UNKNOWN
 from .blocks import Block, means_of
 
 KIND = "wiring"  # kind of all its alarms
+SCENE = "scene"  # channel and cause of the alarm that the scene is of another boom
 CHECKS = 6, 20, 50, 100, 200, 400  # blocks after a start, at the end of which all of them are checked
 NONE = np.zeros((), bool)  # of the channels of a stream that is not checked
 DELAY = 20  # blocks from a check until its answer is taken
@@ -44,11 +45,11 @@ class WiringMonitor:
 
     def __init__(self, scene: Scene, reads: StrokeReading, mounts: Sequence[Mount | None], places: Mapping[str, Place]) -> None:
         self._scene, self._reads, self._places = scene, reads, places
-        self._channels = {
-            stream: names
-            for stream, names in channels_of(len(scene.joints), streams_of(places)).items()
-            if names and is_checked(stream)
-        }
+        channels = channels_of(len(scene.joints), streams_of(places))
+        self._channels = {stream: names for stream, names in channels.items() if names and is_checked(stream)}
+        self._names = [name for names in self._channels.values() for name in names]
+        ends = np.cumsum([len(names) for names in self._channels.values()]).tolist()
+        self._own = {s: slice(end - len(self._channels[s]), end) for s, end in zip(self._channels, ends, strict=True)}
         self._declared = {
             stream: [Channel(name, kind.unit, turned=places.get(kind.stem, Place()).turned) for name in self._channels[stream]]
             for stream, kind in SENSORS.items()
@@ -64,12 +65,10 @@ class WiringMonitor:
     def begin(self) -> None:
         """Restart with the boom at rest; alarms last until the next check."""
         self._blocks: list[tuple[int, Mapping[Stream, Array]]] = []
-        self._age, self._searched = 0, False
+        self._age, self._searched, self._is_other_boom = 0, False, False
         self._model: RestModel | None = None
         self._search: tuple[int, Future[Checked | None]] | None = None
-        self._wrong = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
-        self._doubted = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
-        self._right = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
+        self._wrong, self._doubted, self._right = np.zeros((3, len(self._names)), bool)
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -78,24 +77,27 @@ class WiringMonitor:
 
     @property
     def has_wrong_strokes(self) -> bool:
-        """Return True if strokes are not read as declared, so that every prediction is wrong."""
-        return bool(self._wrong[Stream.STROKES].any())
+        """Return True if strokes are not read as declared, or the scene is of another boom: every prediction is wrong."""
+        return self._is_other_boom or bool(self._wrong[self._own[Stream.STROKES]].any())
 
     def wrong(self, stream: Stream) -> NDArray[np.bool_]:
         """Return the channels of a stream that must not be compared with the prediction, shape (channels,) or ()."""
-        return self._wrong.get(stream, NONE) | self.has_wrong_strokes
+        return self._of(stream, self._wrong) | self.has_wrong_strokes
 
     def doubted(self, stream: Stream) -> NDArray[np.bool_]:
         """Return the channels of a stream not read as declared, while it is looked for how, shape (channels,) or ()."""
-        return self._doubted.get(stream, NONE)
+        return self._of(stream, self._doubted)
+
+    def _of(self, stream: Stream, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        return chosen[self._own[stream]] if stream in self._own else NONE
+
+    def _chosen(self, chosen: NDArray[np.bool_]) -> set[str]:
+        return {self._names[place] for place in np.flatnonzero(chosen)}
 
     def explains(self, alarm: Alarm) -> bool:
         """Return True if an alarm of a single sensor is a consequence of its wiring."""
-        channels = {name for stream, names in self._channels.items() for name in _chosen(names, self._all(stream))}
-        return alarm.kind in {"range", "jump", "noise", "spikes", "intermittent"} and alarm.channel in channels
-
-    def _all(self, stream: Stream) -> NDArray[np.bool_]:
-        return self._wrong[stream] | self._doubted[stream]
+        is_of_reading = alarm.kind in {"range", "jump", "noise", "spikes", "intermittent"}
+        return is_of_reading and alarm.channel in self._chosen(self._wrong | self._doubted)
 
     def take(self, block: Block, strokes: Array, failing: Mapping[Stream, NDArray[np.bool_]]) -> list[Alarm]:
         """Take a block.
@@ -115,9 +117,9 @@ class WiringMonitor:
         """
         if self._age < CHECKS[-1]:
             means = {Stream.STROKES: strokes}
-            for stream in self._wrong:
+            for stream, own in self._own.items():
                 if stream is not Stream.STROKES and (rows := block.readings(stream)) is not None:
-                    means[stream] = np.where(failing[stream] & self._right[stream], np.nan, means_of(rows.raw))
+                    means[stream] = np.where(failing[stream] & self._right[own], np.nan, means_of(rows.raw))
             self._blocks.append((block.start, means))
             self._silent = {s: failing[s] & np.isnan(means.get(s, np.nan)) for s in self._channels}
         self._age += 1
@@ -139,11 +141,12 @@ class WiringMonitor:
         if found is None:
             return
         is_sound = not any(verdict.is_wrong for verdict in found.verdicts)
+        self._is_other_boom &= not is_sound
         for verdict in found.verdicts:
-            self._wrong[verdict.stream] &= not is_sound  # wrong strokes show in other sensors only
-            place = self._channels[verdict.stream].index(verdict.channel)
-            self._doubted[verdict.stream][place] = verdict.is_wrong and not self._searched
-            self._right[verdict.stream][place] |= not verdict.is_wrong
+            place = self._names.index(verdict.channel)
+            self._wrong[place] &= not is_sound  # wrong strokes show in other sensors only
+            self._doubted[place] = verdict.is_wrong and not self._searched
+            self._right[place] |= not verdict.is_wrong
         if self._search is None and not is_sound:
             self._worker = self._worker or ThreadPoolExecutor(1, "wiring")
             self._search = self._age + DELAY, self._worker.submit(check, RestModel(*boom), self._declared, window)
@@ -161,16 +164,19 @@ class WiringMonitor:
 
     def _reported(self, found: Checked, end: int) -> list[Alarm]:
         """Begin and end alarms by the result of a search."""
-        news, self._searched = list[Alarm](), True
-        for doubted in self._doubted.values():
-            doubted[:] = False
+        news, self._searched, self._is_other_boom = list[Alarm](), True, found.is_other_boom
+        if found.is_other_boom and SCENE not in self._last:
+            self._last[SCENE] = Alarm(SCENE, KIND, self._blocks[0][0], None, SCENE, ", ".join(found.wrong_angles))
+            news.append(self._last[SCENE])
+        self._doubted[:] = False
         for verdict in found.verdicts:
             is_wrong = (
                 verdict.is_wrong and verdict.is_explained and (verdict.has_no_gravity or verdict.best != verdict.declared)
             )
-            self._wrong[verdict.stream][self._channels[verdict.stream].index(verdict.channel)] = is_wrong
+            self._wrong[self._names.index(verdict.channel)] = is_wrong
             name = channel_name(verdict)
-            if is_wrong and (name not in self._last or (verdict.is_sure and name not in self._sure)):
+            is_told = is_wrong and not found.is_other_boom
+            if is_told and (name not in self._last or (verdict.is_sure and name not in self._sure)):
                 cause = f"{name}.sensor"
                 since = self._last[name].since if name in self._last else self._blocks[0][0]
                 chance = 1.0 / (1.0 + math.exp(-verdict.margin))  # posterior beside the next way to read it
@@ -182,11 +188,8 @@ class WiringMonitor:
 
     def _ended(self, end: int) -> list[Alarm]:
         """End the alarms of channels that are read as declared by now."""
-        wrong = {name for stream, names in self._channels.items() for name in _chosen(names, self._wrong[stream])}
-        wrong |= {SENSORS[s].stem for s, each in self._wrong.items() if SENSORS[s].is_accelerometer and each.any()}
+        wrong = self._chosen(self._wrong)
+        wrong |= {SENSORS[s].stem for s, own in self._own.items() if SENSORS[s].is_accelerometer and self._wrong[own].any()}
+        wrong = {SCENE} if self._is_other_boom else wrong
         self._sure &= wrong
         return [replace(self._last.pop(name), until=end) for name in list(self._last) if name not in wrong]
-
-
-def _chosen(names: tuple[str, ...], chosen: NDArray[np.bool_]) -> list[str]:
-    return [name for name, is_chosen in zip(names, chosen.tolist(), strict=True) if is_chosen]

@@ -26,6 +26,7 @@ from ..twin.twin import Twin
 from ..types import SENSORS, Array, Place, Stream, StrokeReading
 from ..wiring.check import STROKES_ALONE, Checked, Verdict, check, finding
 from ..wiring.readings import Channel, Lag, RestModel, Series, Window, is_checked, lag_of
+from .inputs import of_another_boom
 from .session_samples import SessionSamples, decoder_of
 
 LOOK = 60.0  # s of a session that `wiring_of` reads
@@ -129,9 +130,7 @@ def commission(
         lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes{without}"
         raise BagError(f"{lacking}. Give the boom's scene by --scene, or the session's mapping.")
     if found.is_other_boom:
-        off = ", ".join(each.channel for each in found.verdicts if each.is_wrong and each.stream is Stream.ANGLES)
-        told = f"{session.path}: {off} and the IMU agree with each other, and not with what the strokes say"
-        raise BagError(f"{told}. The scene ({own.source}) is of another boom. Give the boom's own by --scene.")
+        raise of_another_boom(session, own, ", ".join(found.wrong_angles))
     _mend(document, found)
     absent = [each.channel for each in found.verdicts if found.lacks(each) and each.channel not in mapped.topics.absent]
     for channel in absent:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +65,8 @@ PREDICTED = (
 )  # fmt: skip
 """Fields of a `History` with a row for every prediction."""
 ESTIMATED = tuple(f"estimated {each.name}" for each in fields(EstimateTrace))  # columns of the estimates beside them
-RESIDUALS = ("stamps", "values", "sigmas", "means")
+RESIDUALS = ("stamps", "values", "sigmas", "means")  # columns of one stream; means over a second
+Residuals = Mapping[Stream, dict[str, Array]]
 EXTREME = ("tip_displacement", "tip_position", "tip_acceleration", "moments", "slow_moments", *ESTIMATED[:3])
 """Columns whose extremes are kept."""
 
@@ -84,14 +85,14 @@ class HistoryBuilder:
 
     def add(self, stretch: Stretch) -> History:
         """Add the next stretch; return the history of it alone, with all its rows."""
-        groups = _channel_groups(stretch)
-        own = _stretch_history(stretch, self._scene, self._plan, [*groups.values()])
+        residuals = _residual_columns(stretch)
+        own = _stretch_history(stretch, self._scene, self._plan, residuals)
         self._note_peak(own)
         self._distributions.add(own)
         estimated = dict(zip(ESTIMATED, _estimate_trace(stretch).columns, strict=True))
         self._put(self._predicted, {name: getattr(own, name) for name in PREDICTED} | estimated)
-        for stream, group in groups.items():
-            self._put(self._residuals[stream], {name: getattr(group, name) for name in RESIDUALS})
+        for stream, columns in residuals.items():
+            self._put(self._residuals[stream], columns)
         if own.imu is not None:
             self._put(self._imu, {each.name: getattr(own.imu, each.name) for each in fields(ImuTrace)})
         self._shapes.add(own.shapes)
@@ -121,11 +122,10 @@ class HistoryBuilder:
                 table.thin(self._enlarged(table))  # the newest ones as those before
         found: dict[str, Any] = self._predicted.columns
         load = recording.totals.load.load
-        names = channels_of(len(self._scene.joints))
         tables = {stream: table.columns for stream, table in self._residuals.items() if table.columns}
         return History(
             **{name: found[name] for name in PREDICTED},
-            **_residuals([_ChannelGroup(names[stream], **columns) for stream, columns in tables.items()]),
+            **_residuals(len(self._scene.joints), tables),
             imu=ImuTrace(**self._imu.columns) if self._imu.columns else None,
             shapes=self._shapes.kept,
             gaps=[((start - recording.first) * NANO, (end - recording.first) * NANO) for start, end in recording.gaps],
@@ -162,7 +162,7 @@ class _Shapes:
         return [shape for _, shape in self._chosen] + ([] if is_last else self._newest)
 
 
-def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan, groups: Sequence[_ChannelGroup]) -> History:
+def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan, residuals: Residuals) -> History:
     """Return everything predicted in a stretch, with all its rows, but without gaps and alarms."""
     predictions = stretch.predictions
     stamps = _seconds(predictions.stamps, stretch.first)
@@ -176,7 +176,7 @@ def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan, groups: Sequenc
         joints=predictions.joints,
         cylinder_forces=predictions.cylinder_forces,
         strokes=drives_as_read(plan, predictions.strokes, predictions.cylinder_forces, stretch.reads),
-        **_residuals(groups),
+        **_residuals(stretch.joints, residuals),
         imu=_imu(stretch.of(Stream.IMU), stamps, felt, stretch.first),
         shapes=[(float(stamps[row]), outline.shape.copy()) for row, outline in predictions.outlines.items()],
         moments=predictions.moments,
@@ -222,39 +222,30 @@ def _seconds(stamps: NDArray[np.int64], first: int) -> Array:
     return np.asarray((stamps - first) * NANO, float)
 
 
-class _ChannelGroup(NamedTuple):
-    """Residuals of one stream: channels, stamps (k,) in s; values, sigmas and means over a second, shape (k, channels)."""
-
-    names: tuple[str, ...]
-    stamps: Array
-    values: Array
-    sigmas: Array
-    means: Array
-
-
-def _channel_groups(stretch: Stretch) -> dict[Stream, _ChannelGroup]:
-    """Return the residuals of all streams that have any."""
+def _residual_columns(stretch: Stretch) -> Residuals:
+    """Return the columns `RESIDUALS` of all streams that have any: stamps (k,) in s, else shape (k, channels)."""
     found = {}
     for stream in Stream:
         if len((rows := stretch.of(stream)).stamps):
             stamps = _seconds(rows.stamps, stretch.first)
-            means = _running_means(stamps, rows.values)
-            found[stream] = _ChannelGroup(rows.names, stamps, rows.values, rows.sigmas, means)
+            columns = stamps, rows.values, rows.sigmas, _running_means(stamps, rows.values)
+            found[stream] = dict(zip(RESIDUALS, columns, strict=True))
     return found
 
 
-def _residuals(groups: Sequence[_ChannelGroup]) -> dict[str, Any]:
+def _residuals(joints: int, found: Residuals) -> dict[str, Any]:
     """Return a history's fields of residuals: one row per stamp and stream; NaN in other streams' columns."""
-    stamps = np.concatenate([np.zeros(0), *(group.stamps for group in groups)])
-    names = tuple(name for group in groups for name in group.names)
-    tables = [np.full((len(stamps), len(names)), np.nan) for _ in range(3)]
+    channels = {stream: names for stream, names in channels_of(joints).items() if stream in found}
+    stamps = np.concatenate([np.zeros(0), *(found[stream]["stamps"] for stream in channels)])
+    names = tuple(name for own in channels.values() for name in own)
+    tables = {name: np.full((len(stamps), len(names)), np.nan) for name in RESIDUALS[1:]}
     row = column = 0
-    for group in groups:
-        place = slice(row, row + len(group.stamps)), slice(column, column + len(group.names))
-        for table, part in zip(tables, group[2:], strict=True):
-            table[place] = part
+    for stream, own in channels.items():
+        place = slice(row, row + len(found[stream]["stamps"])), slice(column, column + len(own))
+        for name, table in tables.items():
+            table[place] = found[stream][name]
         row, column = place[0].stop, place[1].stop
-    given = dict(zip(("residual_values", "residual_sigmas", "residual_means"), tables, strict=True))
+    given = {f"residual_{name}": table for name, table in tables.items()}
     return {"residual_stamps_s": stamps, "residual_names": names, **given}
 
 

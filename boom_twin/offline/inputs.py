@@ -1,14 +1,10 @@
-"""Inputs of a replay: the session with its scene, mapping and settings, given or as it was recorded; test for another boom."""
+"""Inputs of a replay: the session with its scene, mapping and settings, given or as it was recorded."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from math import degrees, radians
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from ..bag.advice import refuse_conflicts
 from ..bag.reader import Session, read, scan
@@ -23,13 +19,13 @@ from ..bag.session_model import (
 )  # fmt: skip
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
-from ..health.wiring_monitor import KIND as WIRING
+from ..health.wiring_monitor import SCENE
 from ..messages.sample_decoder import NO_MEASUREMENT
 from ..messages.topic_table import NO_AREAS, InputTopic, Topics
 from ..scene.load import SceneSource
 from ..scene.schema import Scene
 from ..twin.twin import Twin
-from ..types import NANO, SENSORS, Array, Health, Report, Sample, Stream, streams_of
+from ..types import NANO, SENSORS, Health, Stream, streams_of
 from .progress import Progress
 
 
@@ -102,14 +98,17 @@ class ReplayInputs:
         given = self.scene, settings, mounts, self.health, reads, topics.absent
         return Twin(*given, causes=causes, places=topics.places, lagging=topics.lagging)
 
-    def refuse(self, reason: str) -> None:
-        """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""
-        if reason:
-            raise BagError(
-                f"{self.session.path}: {reason}. The scene ({self.kept.source}) is of another boom, or the sensors are wired "
-                f"otherwise: give the scene by --scene, or the mapping that `boom_twin mapping --check {self.session.path}` "
-                "proposes by --mapping."
-            )
+    def refuse_other_boom(self, health: Health) -> None:
+        """Raise BagError if the wiring check says that the session is of another boom than the scene."""
+        for alarm in health.alarms:
+            if alarm.cause == SCENE:
+                raise of_another_boom(self.session, self.kept, alarm.evidence)
+
+
+def of_another_boom(session: Session, scene: SessionScene, angles: str) -> BagError:
+    """Return the error that a session is of another boom than its scene, by channels of angles."""
+    told = f"{session.path}: {angles or 'the angles'} and the IMU agree with each other, and not with what the strokes say"
+    return BagError(f"{told}. The scene ({scene.source}) is of another boom. Give the boom's own by --scene.")
 
 
 def replay_inputs(
@@ -146,64 +145,3 @@ def _has_rates(session: Session, topic: InputTopic, wanted: list[str]) -> bool:
         return False
     first = next(iter(read(session, {topic.absolute: topic.type})), None)
     return first is not None and first[2].angular_velocity_covariance[0] != NO_MEASUREMENT
-
-
-LARGEST_RESIDUAL = radians(10.0)  # largest residual by sag, load, wrong stiffness, and most encoders' zeros
-
-
-class OtherBoom:
-    """Test for a session of another boom, by the medians of the angles' residuals.
-
-    The test uses the first window in which the readings of most encoders change. A constant encoder may be dead and is not
-    used. A single large residual may be an encoder fault. If more than half are large, the scene is wrong. The test is made
-    once, because a later difference is a fault of the rig. It is not made if health reports wrong wiring.
-    """
-
-    def __init__(self) -> None:
-        self.is_judged = False  # True after the test: no more samples are needed
-        self._begin = 0
-        self._values: list[Array] = []
-        self._residuals: list[Array] = []
-
-    def took(self, sample: Sample, report: Report) -> str:
-        """Take the `report` of `sample`; return the evidence of another boom, empty without evidence."""
-        for part in report.all:
-            self.hear(part.health)
-        values = [sample.values] if sample.stream is Stream.ANGLES else []
-        found = [each.values for part in report.all for each in part.residuals if each.stream is Stream.ANGLES]
-        return self.take(sample.stamp, values, found)
-
-    def hear(self, health: Health | None) -> None:
-        """Take the health of the rig: wrong wiring explains large residuals."""
-        self.is_judged |= health is not None and any(alarm.kind == WIRING for alarm in health.alarms)
-
-    def take(self, stamp: int, values: Iterable[Array], residuals: Iterable[Array]) -> str:
-        """Take rows of angles and of their residuals (n,) in rad up to a `stamp` (ns); return the same as `took`."""
-        judged_time = 5_000_000_000  # window (ns) of the test
-        if self.is_judged:
-            return ""
-        self._values.extend(values)
-        self._residuals.extend(residuals)
-        self._begin = self._begin or stamp
-        return self.judge() if stamp - self._begin > judged_time else ""
-
-    def judge(self) -> str:
-        """Return the evidence of another boom, empty without evidence; clear the window."""
-        fewest_residuals = 10  # least number of a joint's residuals in the window
-        values, residuals = self._values, self._residuals
-        self._begin, self._values, self._residuals = 0, [], []
-        if self.is_judged or len(values) < fewest_residuals or len(residuals) < fewest_residuals:
-            return ""
-        table, off = np.array(values), np.array(residuals)
-        counts = np.isfinite(off).sum(axis=0)
-        heard = [i for i in range(len(counts)) if counts[i] >= fewest_residuals]
-        live = [i for i in heard if np.nanmax(table[:, i]) > np.nanmin(table[:, i])]
-        if 2 * len(live) <= len(heard):
-            return ""
-        self.is_judged = True
-        medians = {i: float(np.nanmedian(off[:, i])) for i in live}
-        far = {i: value for i, value in medians.items() if abs(value) > LARGEST_RESIDUAL}
-        if 2 * len(far) <= len(live):
-            return ""
-        told = ", ".join(f"joint_{i + 1} by {degrees(value):+.1f} deg" for i, value in far.items())
-        return f"{told} off what the strokes say, and at most {degrees(LARGEST_RESIDUAL):g} deg can be a fault of the rig"

@@ -26,11 +26,11 @@ from ..scene.load import SceneSource
 from ..system.atomic_files import write_atomic
 from ..system.result_folder import REPLAY, result_folder
 from ..system.result_text import SummaryDisplay, data_frame
-from ..twin.blocks import CODES, CONSEQUENCES, EVENTS, ResidualBlock, SampleBlock
+from ..twin.blocks import CODES, CONSEQUENCES, EVENTS, SampleBlock
 from ..twin.twin import Twin, drive
-from ..types import SENSORS, Array, Change, Stream, StrokeReading
+from ..types import SENSORS, Array, Change, StrokeReading
 from .ground_truth import TipErrors, TipTruth, truth_in
-from .inputs import USUAL, OtherBoom, ReplayInputs, ReplayOptions, replay_inputs
+from .inputs import USUAL, ReplayInputs, ReplayOptions, replay_inputs
 from .progress import Progress
 from .recording import Recording, Stretch, alarm_as_text, clocks_of, summary_of
 from .sample_table import SampleTable, columns_of
@@ -201,7 +201,6 @@ def replay_into(
             spent += time.perf_counter() - began
 
     recording = Recording(joints, None if take is None else timed, errors, given.strokes.reading, given.streams)
-    other_boom = OtherBoom()
     samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
     with ExitStack() as stack:
         twin, put = given.twin(options.causes), None
@@ -222,14 +221,9 @@ def replay_into(
             block, rows = step
             recording.add(rows, block)
             for health in rows.health.values():
-                other_boom.hear(health)
+                given.refuse_other_boom(health)
             if put is not None:
                 put(rows)
-            if not other_boom.is_judged:
-                given.refuse(
-                    other_boom.take(int(block.stamps[-1]), *(_angles(each, joints) for each in (block, rows.residuals)))
-                )
-        given.refuse(other_boom.judge())
     if bar is not None:
         bar.close()
     wall = time.perf_counter() - began - spent
@@ -257,11 +251,6 @@ def replay_into(
         summary |= errors.rms
     write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
     return Replay(summary, recording, session, truth)
-
-
-def _angles(block: SampleBlock | ResidualBlock, joints: int) -> Array:
-    """Return the angles in a block of samples, or their residuals, shape (k, joints), rad."""
-    return block.values[block.streams == CODES[Stream.ANGLES], :joints]
 
 
 def _first_refused(given: ReplayInputs) -> str:

@@ -78,6 +78,11 @@ class Checked(NamedTuple):
         return verdict.declared.name not in names and not any(each.is_wrong for each in own)
 
     @property
+    def wrong_angles(self) -> list[str]:
+        """Return the angle channels that are not read as declared."""
+        return [each.channel for each in self.verdicts if each.is_wrong and each.stream is Stream.ANGLES]
+
+    @property
     def has_strokes_alone(self) -> bool:
         """Return True if no other sensor was read. Strokes swapped or shifted within the travels are then not found."""
         return set(self.tables) == {Stream.STROKES}
@@ -204,22 +209,24 @@ class _Checker:
         return self._model.expected(np.column_stack(columns))
 
     def _compare_other_boom(self) -> None:
-        """Compare the best explanation with another boom, whose angles and IMUs are as declared and agree with each other.
+        """Compare the best explanation with another boom, whose sensors are as declared, and whose angles and IMUs agree.
 
         Without an IMU, another boom is not told from encoders whose zeros nobody set.
         """
-        best, table, declared = self.found[0], self._tables.get(Stream.ANGLES), self._declared[Stream.ANGLES]
-        if table is None or any(each.name not in table.names for each in declared):
+        table, declared = self._tables.get(Stream.ANGLES), self._declared[Stream.ANGLES]
+        own = next((each for each in self.found if each.strokes == tuple(self._declared[Stream.STROKES])), None)
+        if own is None or table is None or any(each.name not in table.names for each in declared):
             return
-        expected = self._expected(best.strokes)
+        expected = self._expected(own.strokes)
         cost, turns = other_boom(table, declared, expected)
-        unset = other = cost + best.cost - best.parts[Stream.ANGLES].cost
-        for stream in best.parts.keys() & expected.gravity.keys():
+        unset = other = cost + own.cost - own.parts[Stream.ANGLES].cost
+        for stream in own.parts.keys() & expected.gravity.keys():
             gravity = expected.gravity[stream] * np.exp(-1j * turns[:, self._model.sections[stream]])
             ways = gravity_hypotheses(self._tables[stream], self._declared[stream], gravity, self._weight)
-            other += ways[0].cost - best.parts[stream].cost
-        self._to_other_boom = other - best.cost
-        self.is_other_boom = min(best.cost, unset) - other >= SURE
+            other += ways[0].cost - own.parts[stream].cost
+        best = self.found[0].cost
+        self._to_other_boom = other - best
+        self.is_other_boom = min(best, unset) - other >= SURE
 
     def _part(self, stream: Stream, expected: Expected, cube_of: Callable[[], Cube]) -> _Part:
         doubtful = 1.0  # nats per block above which other ways are compared, as an error may show in few postures

@@ -157,7 +157,8 @@ def other_boom(table: Table, declared: Sequence[Channel], expected: Expected) ->
     cost, turns, turn, units = OTHER_BOOM, list[Array](), np.zeros(len(table.values)), SENSORS[Stream.ANGLES].units
     for j, own in enumerate(declared):
         off = _angle_errors(si(own, units, table.values[:, table.names.index(own.name)]), own, expected, j)
-        cost += math.log(OTHER_LINKAGE / ANGLE_ERROR) + 0.5 * (float(np.nanmean(off)) / OTHER_LINKAGE) ** 2
+        mean = float(off[np.isfinite(off)].mean()) if np.isfinite(off).any() else math.inf  # no posture has such strokes
+        cost += math.log(OTHER_LINKAGE / ANGLE_ERROR) + 0.5 * (mean / OTHER_LINKAGE) ** 2
         turn = off + (0.0 if own.absolute else turn)
         turns.append(turn)
     return cost, np.column_stack(turns)

@@ -6,8 +6,9 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from calibration.sessions import Made, cut_to, made, off
+from calibration.sessions import Made, made, off
 from made_once import MadeOnce
+from oracle.booms import short_boom
 
 from boom_twin import Scene, load_scene
 
@@ -22,7 +23,7 @@ def wrong_boom(made_once: MadeOnce) -> Made:
 @pytest.fixture(scope="session")
 def two_sections() -> Scene:
     """Quick to simulate."""
-    return cut_to(2)
+    return short_boom(2)
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from default_boom import parameter, with_parameters
 from drive_twin import drive_readings, note_drives
-from oracle import booms
 from recordings import write_session
 
 from boom_twin import Scene
@@ -47,11 +46,3 @@ def off(scene: Scene, *factors: float, **others: float) -> Scene:
     """The scene with other cylinder stiffnesses."""
     values = {f"cylinder_{i}.k": factor * parameter(scene, f"cylinder_{i}.k") for i, factor in enumerate(factors, start=1)}
     return with_parameters(scene, values | others)
-
-
-def cut_to(sections: int) -> Scene:
-    """The first sections of the default boom."""
-    spec = booms.document()
-    spec["sections"], spec["joints"] = spec["sections"][:sections], spec["joints"][:sections]
-    spec["postures"] = {name: angles[:sections] for name, angles in spec["postures"].items()}
-    return booms.scene_of(spec)

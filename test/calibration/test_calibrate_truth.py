@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calibration.sessions import ENCODERS, cut_to, made, off
+from calibration.sessions import ENCODERS, made, off
 from default_boom import anew, parameter
 from oracle import booms
+from oracle.booms import short_boom
 
 from boom_twin import load_scene
 from boom_twin.calibration import Choice, calibrate
@@ -79,7 +80,7 @@ def test_a_right_model_stays_where_it_is(tmp_path):
 
 @pytest.mark.slow
 def test_three_sections_with_another_bending_stiffness(tmp_path):
-    scene = cut_to(3)
+    scene = short_boom(3)
     truth = off(scene, 1.05, 1.0, 0.95, **{"section_2.EI": 1.1 * parameter(scene, "section_2.EI")})
     bag = made(truth, "arch", 45.0, 8).write(tmp_path / "bag", 8)
     found = calibrate([bag], scene, Choice(stiffness=True, zeros="none"))

@@ -15,21 +15,18 @@ from ruamel.yaml import YAML
 pytest.importorskip("exudyn")
 
 from command import main
-from default_boom import default_text
+from default_boom import anew
+from oracle import booms
 from recordings import load_truth, read, scan
 
-SECTION = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}
-CYLINDER = {"k": 2.0e6, "closed_length": 1.08, "max_stroke": 0.79}
+STIFFNESS = 2.0e6  # N/m
 
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One rigid section on an oil spring."""
-    document = dict(YAML(typ="safe").load(default_text()))
-    joint = {"kind": "A", "range_deg": [-5, 85], "cylinder": CYLINDER}
     path = tmp_path_factory.mktemp("scene") / "one.yaml"
-    with path.open("w") as file:
-        YAML().dump(document | {"sections": [SECTION], "joints": [joint], "postures": {"up": [40]}}, file)
+    path.write_text(anew(booms.scene_of(booms.one_rigid(k=STIFFNESS))))
     return path
 
 
@@ -89,7 +86,7 @@ def test_sessions_of_lengths_and_of_drives_are_told(scene: Path, tmp_path: Path,
     assert replayed(scene, bag)["strokes"] == "length"
     truth = np.genfromtxt(bag / "truth.csv.gz", delimiter=",", names=True)
     assert truth["drive_1_m"][-1] - truth["drive_1_m"][0] == pytest.approx(0.002 * (truth["t_s"][-1] - 1.0), abs=1e-6)
-    extension = truth["cylinder_force_1_N"] / CYLINDER["k"]
+    extension = truth["cylinder_force_1_N"] / STIFFNESS
     assert truth["length_1_m"] - truth["drive_1_m"] == pytest.approx(extension, abs=2e-7)
 
 

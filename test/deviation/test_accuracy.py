@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
-from default_boom import default_text, strokes_of_posture
+from default_boom import EXACT, default_text, strokes_of_posture
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
 from boom_twin.deviation.accuracy import TipAccuracy, accuracy_at
@@ -22,7 +22,6 @@ from boom_twin.validation.rig.faults import wrong_by
 SCENE = load_scene()
 ARCH = strokes_of_posture(SCENE, "arch")
 Z_FOLD = load_scene(str(files("boom_twin") / "examples" / "five_section_z_fold.yaml"))
-EXACT = Settings(scene_error=0.0)
 SETS = ([], [Stream.ANGLES], [Stream.ANGLES, Stream.IMU], [Stream.ANGLES, Stream.IMU, Stream.IMU])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from default_boom import strokes_of_posture
+from default_boom import EXACT, strokes_of_posture
 from scipy.linalg import expm
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
@@ -148,7 +148,7 @@ def test_a_boom_at_rest_is_predicted_where_statics_has_it_however_soft_the_oil_i
     joints = [joint.model_copy(update={"cylinder": joint.cylinder.model_copy(update={"k": 0.7 * (joint.cylinder.k or 0.0)})})
               for joint in SCENE.joints]  # fmt: skip
     softer = statics(SCENE.model_copy(update={"joints": tuple(joints)}), DRIVES)
-    twin, rng = Twin(SCENE, Settings(scene_error=0.0)), np.random.default_rng(3)
+    twin, rng = Twin(SCENE, EXACT), np.random.default_rng(3)
     for k in range(400):
         values = softer.lengths + rng.normal(0.0, 2e-5, N)
         report = twin.update(Sample(Stream.STROKES, 10**18 + k * STEP, values))

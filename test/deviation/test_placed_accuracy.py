@@ -9,9 +9,9 @@ from scipy.linalg import cholesky, expm
 
 pytest.importorskip("exudyn")
 
-from default_boom import strokes_of_posture
+from default_boom import EXACT, strokes_of_posture
 
-from boom_twin import Sample, Settings, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.deviation.accuracy import accuracy_at
 from boom_twin.scene.summary import weight_of
 from boom_twin.types import Array, Place
@@ -60,5 +60,5 @@ def test_the_error_of_the_tip_is_as_forecast(session: RigSession, streams: tuple
             if np.isfinite(readings[stream][i]).any():
                 twin.update(Sample(stream, stamp, readings[stream][i]))
     error = (np.array(tips) - session.truth["tip"])[session.truth["t"] > SETTLED]
-    stated = accuracy_at(SCENE, ARCH, streams, Settings(scene_error=0.0), places=PLACES).tip[:2]
+    stated = accuracy_at(SCENE, ARCH, streams, EXACT, places=PLACES).tip[:2]
     assert np.sqrt((error**2).sum(axis=1).mean()) == pytest.approx(np.hypot(*stated), rel=0.2)

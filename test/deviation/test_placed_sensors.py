@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
-from default_boom import default_text, strokes_of_angles, strokes_of_posture
+from default_boom import strokes_of_angles, strokes_of_posture
+from oracle import booms
 from recordings import load_mapping
 from ros_messages import SampleDecoder, new_message
-from ruamel.yaml import YAML
 
-from boom_twin import Sample, Scene, Settings, Stream, Twin, UsageError, load_scene, statics
+from boom_twin import Sample, Settings, Stream, Twin, UsageError, load_scene, statics
 from boom_twin.analysis.bending_stress import stations
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.deviation.states import PREDICTION, drive_place
@@ -27,17 +27,6 @@ ARCH = strokes_of_posture(SCENE, "arch")
 G = float(np.hypot(*gravity_in_base(SCENE)))
 LAST = SCENE.sections[-1].length
 STEP = 5_000_000  # ns
-
-
-def one_section(tmp_path: Path) -> Scene:
-    """A rigid section on an incompressible cylinder."""
-    document = dict(YAML(typ="safe").load(default_text()))
-    section = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}
-    joint = {"kind": "A", "range_deg": [-5, 85], "cylinder": {"closed_length": 1.08, "max_stroke": 0.79}}
-    path = tmp_path / "one.yaml"
-    with path.open("w") as file:
-        YAML().dump(document | {"sections": [section], "joints": [joint], "postures": {"up": [40]}}, file)
-    return load_scene(path)
 
 
 def moved(count: int) -> Array:
@@ -55,8 +44,8 @@ def residuals_of(twin: Twin, stream: Stream, readings: Array) -> list[Residuals]
 
 
 @pytest.mark.parametrize(("at", "turned"), [(0.0, 0.0), (1.3, 0.4), (3.0, -2.0)])
-def test_rest_and_a_turn_about_one_joint_read_as_their_closed_form(tmp_path: Path, at: float, turned: float) -> None:
-    scene, angle, speed = one_section(tmp_path), math.radians(30.0), 0.4
+def test_rest_and_a_turn_about_one_joint_read_as_their_closed_form(at: float, turned: float) -> None:
+    scene, angle, speed = booms.scene_of(booms.one_rigid()), math.radians(30.0), 0.4
     boom = BoomPredictor(scene, Settings(), places={"imu_2": Place(1, at, turned)})
     boom.start(strokes_of_angles(scene, np.array([angle])))
     p, f, gravity = boom.posture, boom.filters, gravity_in_base(scene)

@@ -137,10 +137,10 @@ def spring_of(each):
     return 1.0 - each.scene.joints[1].cylinder.k / stiffness()
 
 
-def taken(twins, seconds):
-    """Return the alarms that twins begin and end with so many seconds of samples."""
+def taken(twins, seconds, first=0):
+    """Return the alarms that twins begin and end with so many seconds of samples from the `first` on."""
     found = []
-    for second in range(seconds):
+    for second in range(first, first + seconds):
         stamps = np.array([second * SECOND, second * SECOND + SECOND // 2])
         twins.reach(second * SECOND, lambda: (np.zeros(10, bool), np.zeros(4, bool)))
         twins.take(SampleBlock(np.zeros(2, np.int64), stamps, np.zeros((2, 4))))
@@ -274,8 +274,5 @@ def test_evidence_before_a_change_counts_no_more():
     for second in range(45):
         if second % 15 == 14:
             twins.change(Change(second * SECOND, False, {"payload": 0.0, "line_fill": 0.0, "tip_load_limit": 500.0}, {}))
-        stamps = np.array([second * SECOND, second * SECOND + SECOND // 2])
-        twins.reach(second * SECOND, lambda: (np.zeros(10, bool), np.zeros(4, bool)))
-        twins.take(SampleBlock(np.zeros(2, np.int64), stamps, np.zeros((2, 4))))
-        found += twins.news(second * SECOND)
+        found += taken(twins, 1, second)
     assert found == []

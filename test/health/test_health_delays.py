@@ -14,7 +14,7 @@ from boom_twin.health.blocks import BLOCK as BLOCK_TIME
 from boom_twin.health.blocks import Block, MeasuredRows
 from boom_twin.health.lag_monitor import LagMonitor
 from boom_twin.health.monitor import HealthMonitor
-from boom_twin.health.stream_readings import StreamReadings, StreamSurvey
+from boom_twin.health.sensor_check import SensorCheck, StreamReadings
 from boom_twin.types import NO_PLACES, Alarm, Array, StrokeReading, channels_of
 
 from .recorded import run, session
@@ -25,9 +25,10 @@ NONE = np.zeros(2, dtype=bool)  # masked channels
 
 def block_of(raw: Array, expected: Array, number: int) -> StreamReadings:
     """Return readings (k, channels), evenly in time."""
-    count, channels = raw.shape
+    count, edge = len(raw), np.zeros(raw.shape[1])
     stamps = number * BLOCK_TIME + np.arange(count) * (BLOCK_TIME // max(count, 1))
-    return StreamSurvey(1.0, channels).take(MeasuredRows(stamps, raw, raw - expected, np.ones(raw.shape)), NONE, 0.0)
+    check = SensorCheck(1.0, 0.0, edge, edge, 0.0)
+    return check.summary(MeasuredRows(stamps, raw, raw - expected, np.ones(raw.shape)), NONE, 0.0)
 
 
 def angles(times: Array) -> Array:

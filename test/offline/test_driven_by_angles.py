@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
+from default_boom import EXACT
 from offline.by_the_node import assert_same_bytes
 from recordings import load_mapping, load_truth, write_samples
 from session_readings import samples_in
 
-from boom_twin import BagError, Sample, Settings, Stream, Twin, replay
+from boom_twin import BagError, Sample, Stream, Twin, replay
 from boom_twin.types import StrokeReading
 
 BAGS = Path(__file__).parents[2] / "bags"
@@ -38,7 +39,7 @@ def without_strokes(request, tmp_path_factory):
 
 def test_the_tip_follows_the_truth(without_strokes, mapping, tmp_path):
     """Prediction from angles alone; the estimate with the IMU, and its stated deviation; joint residuals are innovations."""
-    found = replay(without_strokes, None, tmp_path / "out", Settings(scene_error=0.0), mapping=mapping)
+    found = replay(without_strokes, None, tmp_path / "out", EXACT, mapping=mapping)
     summary, truth, most = found.summary, load_truth(without_strokes), MOST[without_strokes.name]
     assert summary["strokes"] == "angle" and summary["strokes_source"].endswith("angles.yaml, drive")
     assert summary["samples"] == len(truth.times) and summary["dropped"] == 0 and summary["alarms"] == []

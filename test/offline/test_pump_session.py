@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from default_boom import EXACT
 from drive_twin import PUMP_DRIVES
 from recordings import load_truth, scan
 from session_readings import samples_in
 
-from boom_twin import Settings, Stream, Twin, load_scene, replay
+from boom_twin import Stream, Twin, load_scene, replay
 from boom_twin.twin.blocks import block_of
 
 SESSION = Path(__file__).parents[2] / "bags" / "pump_session"
 SESSIONS = {"lengths": SESSION, "drives": PUMP_DRIVES}
 TIP, ESTIMATE = {"lengths": 1.5e-3, "drives": 0.05}, {"lengths": 0.8e-3, "drives": 1e-3}  # m, most that the errors may be
-EXACT = Settings(scene_error=0.0)
 QUIET = 5.0  # s, before the pump begins
 
 

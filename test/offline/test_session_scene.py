@@ -9,12 +9,14 @@ import pytest
 from command import main
 from default_boom import default_text
 from drive_twin import note_drives
+from health.recorded import ARCH, run
+from health.recorded import session as recorded
 from offline.booms_apart import scene_text, session
 from recordings import SHEET as FILE_NAME
 from recordings import MessageWriter, SessionSheet, scene_of
 from ros_messages import fill_header, load_topics, new_message
 
-from boom_twin import BagError, Settings, Stream, load_scene, replay
+from boom_twin import BagError, Settings, Stream, Twin, load_scene, replay
 from boom_twin.bag.session_model import sha256
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.scene.load import DEFAULT_NAME
@@ -96,17 +98,15 @@ def test_names_that_do_not_match(tmp_path):
         replay(bag, None, tmp_path / "out")
 
 
-def test_a_boom_of_as_many_joints_that_does_not_fit_is_refused(four, tmp_path, capsys):
+def test_a_boom_of_as_many_joints_that_does_not_fit_is_refused(tmp_path, capsys):
     other = tmp_path / "other.yaml"
     other.write_text(scene_text(4, closed_longer=0.05))
-    assert main(arguments(four, tmp_path / "out", "--scene", str(other))) == 1
+    assert main(arguments(ARCH, tmp_path / "out", "--scene", str(other), "--duration", "4")) == 1
     told = capsys.readouterr().err
-    assert "joint_2 by +20.0 deg" in told and f"The scene ({other}) is of another boom" in told and "--scene" in told
+    assert "and the IMU agree with each other" in told and f"The scene ({other}) is of another boom" in told
     assert not (tmp_path / "out" / "summary.json").exists()
-    feed = bag_feed(four, scene_of(four, other), Settings())
-    while feed.is_reading:
-        feed.poll()
-    assert "joint_2 by +20.0 deg" in feed.trouble and "of another boom" in feed.trouble
+    found = run(recorded(4.0), twin=Twin(load_scene(other), health=True))
+    assert {(alarm.channel, alarm.kind) for time, alarm in found.states() if time > 3.0} == {("scene", "wiring")}
 
 
 def test_an_encoder_five_degrees_off_is_a_fault_to_be_found(tmp_path):

@@ -40,6 +40,13 @@ def short_boom(sections):
     return scene_of(spec)
 
 
+def one_rigid(**cylinder):
+    """One rigid section of 40 kg on a massless, undamped cylinder, to which `cylinder` adds keys."""
+    section = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}
+    joint = {"kind": "A", "range_deg": [-5, 85], "cylinder": {"closed_length": 1.08, "max_stroke": 0.79, **cylinder}}
+    return document() | {"sections": [section], "joints": [joint], "postures": {"up": [40]}}
+
+
 def on_elastic_base(scene, stiffness=5.0e6, damping=None):
     """The boom on a base with an elastic hinge, N m/rad and N m s/rad."""
     return scene.model_copy(update={"base": scene.base.model_copy(update={"stiffness": stiffness, "damping": damping})})

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from convergence.balances import states_of
-from default_boom import strokes_of_posture
+from default_boom import EXACT, strokes_of_posture
 from drive_twin import drive_twin
 from session_readings import samples_in
 
@@ -84,7 +84,6 @@ def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene, mount):
 
 SCENE, STEP, EVERY = load_scene(), 1.25e-3, 4
 SIGMA = 1.745e-4  # rad
-EXACT = Settings(scene_error=0.0)
 MOST = {"root": 9e-3, "head": 9e-3, "root_compensated": 1e-3, "head_compensated": 1e-3}  # m
 
 

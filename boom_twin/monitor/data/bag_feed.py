@@ -21,7 +21,7 @@ from ...diagnostics.twin_status import TwinWatch
 from ...errors import BagError, BoomTwinError
 from ...messages.report_encoder import ReportEncoder
 from ...messages.topic_table import NODE, Output, Topic, Topics
-from ...offline.inputs import OtherBoom, ReplayInputs, ReplayOptions, replay_inputs
+from ...offline.inputs import ReplayInputs, ReplayOptions, replay_inputs
 from ...offline.session_samples import SessionSamples
 from ...scene.schema import Scene
 from ...twin.twin import Twin, drive
@@ -134,7 +134,6 @@ def _take_predicted(feed: BagFeed, topics: Topics, given: ReplayInputs, twin: Tw
         if step is not None:
             twin.took(*step)
         yield
-    twin.finish()
     if not feed.store.tables:
         raise BagError(f"{given.session.path}: no stroke could be used; they need names cylinder_1 .. in m, or a mapping.")
 
@@ -151,7 +150,6 @@ class TwinView:
         sensors = sensors_of(scene, settings, required, mounts, topics.absent)
         names = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._watch = TwinWatch(sensors, names, Thresholds(), lambda: self._time)
-        self._other_boom = OtherBoom()
         self._peers = {stream: Peers(topic.absolute) for stream, topic in topics.inputs.items()}
         self._looked: float | None = None
 
@@ -165,20 +163,11 @@ class TwinView:
         self._feed.topic_rows.measure(sample)
         self._watch.seen(sample.stream, sample.stamp)
         self._watch.took(sample, report, 0.0)
-        self._refuse(self._other_boom.took(sample, report))
         for key, encoded in chain.from_iterable(map(self._encoder.fill, report.all)):
             if key in self._names:
                 self._feed.topic_rows.take_encoded(self._names[key], encoded, self._feed.now())
         if self._time - self._looked >= diagnosis_period or self._watch.is_urgent():
             self._look()
-
-    def finish(self) -> None:
-        """Raise BagError if the session, which has ended, turns out to be of another boom."""
-        self._refuse(self._other_boom.judge())
-
-    def _refuse(self, reason: str) -> None:
-        if reason:
-            raise BagError(f"{reason}: the scene is of another boom. Give the one of this by --scene.")
 
     def _look(self) -> None:
         found = self._watch.look(self.twin.counts, "", self._peers, (), self._time)

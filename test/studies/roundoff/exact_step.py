@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from kernels.dense import riccati_pass
 from scipy import linalg
 
 from boom_twin import Scene, UsageError
@@ -20,7 +21,6 @@ from boom_twin.kernels.integrators import prepare
 from boom_twin.kernels.tables import OK, Motion, State, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.matrix_product import new_product, plain_pass
-from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
 from .dense_solver import Kinematics, Long
 
@@ -77,11 +77,7 @@ def one_step(scene: Scene, angles: np.ndarray, step: float, rho: float) -> StepR
 
 
 def _riccati(plan: Plan, state: State, work: Work, motion: Motion, drive: np.ndarray) -> bool:
-    clear_cut(work, FREE)
-    last, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
-    status, _, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, last, FREE)
-    sweep_out(plan.tables, state, work, ROOT, last, FREE)
-    return bool(status == OK)
+    return bool(riccati_pass(plan, state, work, motion, drive, np.zeros(plan.joints)) == OK)
 
 
 def _plain(plan: Plan, state: State, work: Work, motion: Motion, drive: np.ndarray) -> bool:

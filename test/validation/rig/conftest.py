@@ -5,23 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from default_boom import default_text
-from ruamel.yaml import YAML
+from oracle import booms
 
 
 @pytest.fixture
 def document() -> dict[str, Any]:
     """The default scene as plain mappings, to be changed at will."""
-    return dict(YAML(typ="safe").load(default_text()))
+    return booms.document()
 
 
 @pytest.fixture
-def one_rigid(document: dict[str, Any]) -> dict[str, Any]:
+def one_rigid() -> dict[str, Any]:
     """One rigid section of 40 kg on a massless, undamped cylinder with an oil spring."""
-    section = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}
-    cylinder = {"k": 2.0e6, "closed_length": 1.08, "max_stroke": 0.79}
-    joint = {"kind": "A", "range_deg": [-5, 85], "cylinder": cylinder}
-    return document | {"sections": [section], "joints": [joint], "postures": {"up": [40]}}
+    return booms.one_rigid(k=2.0e6)
 
 
 @pytest.fixture
