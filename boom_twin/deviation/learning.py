@@ -12,7 +12,7 @@ from .states import BURST, ESTIMATE, FED, OPEN, PREDICTION, VALVES, drive_place,
 LEARN_LOAD = 3.0  # s, in which the variance of the fast load is learnt
 SURPRISE = 9.0  # largest square of a value that counts in the learnt variance, in terms of the present variance
 LEAST_JERK, MOST_JERK = 1e-3, 10.0  # m^2/s^5
-OPENING = 0.5  # m/s^2, by which a valve that opens may accelerate the tip: standard deviation
+OPENING = 1.0  # m/s^2, by which a valve that opens may accelerate the tip: standard deviation
 JERK_RISE, JERK_FALL = 0.05, 0.5  # s, in which that density is learnt
 MOVING = 0.1  # m/s, by which a drive that moves carries the tip: standard deviation
 OPENED = 5.0  # logarithm of the odds for a moving drive, above which its valve is believed open

@@ -57,7 +57,7 @@ def test_a_constant_residual_is_not_said_to_be_as_expected(tmp_path):
     told = [line for line in as_text(result.summary) if line.endswith("times the expected noise")]
     ratios = [float(line.split("rms, ")[1].split()[0]) for line in told]
     assert len(ratios) == 4 and (mean > 100).any()
-    np.testing.assert_array_less(mean, np.array(ratios) + 0.01)
+    np.testing.assert_array_less(mean, np.array(ratios) + 0.06)  # told to a decimal
 
 
 def test_a_gap_is_an_alarm_with_its_times(tmp_path):
