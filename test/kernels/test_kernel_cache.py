@@ -227,9 +227,15 @@ from numba.core.cpu import CPUTargetOptions
 for name in ("_nrt", "no_cfunc_wrapper", "forceinline"):
     delattr(next(each for each in CPUTargetOptions.__mro__ if name in vars(each)), name)
 """
+WITHOUT_DUMPS = """
+import sys, types
+import numba.core.serialize as own
+sys.modules[own.__name__] = types.ModuleType(own.__name__)
+vars(sys.modules[own.__name__]).update((name, value) for name, value in vars(own).items() if name != "dumps")
+"""
 GONE = {
     "a method": "import numba.core.compiler as c; del c.CompileResult._reduce",
-    "a name": "import numba; import numba.core.runtime as r; del r.rtsys",
+    "a name": WITHOUT_DUMPS,
     "options": WITHOUT_OPTIONS,
 }
 
