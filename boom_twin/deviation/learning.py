@@ -7,6 +7,7 @@ import math
 from ..kernels.jit import inner
 from .kalman import DRIVE_TIME
 from .mixture import LEAST_CHANCE, copy_model, first_model
+from .rows import reach2
 from .states import BURST, ESTIMATE, FED, OPEN, PREDICTION, VALVES, drive_place, force_place
 
 LEARN_LOAD = 3.0  # s, in which the variance of the fast load is learnt
@@ -23,13 +24,16 @@ UNEVEN = 0.5  # largest relative change of the sampling interval within a third 
 
 @inner
 def watch_valves(p, f, h, mixture, size):
-    """Set valves of a mixture open or closed by the rates of their drives in its model in which all are open."""
+    """Set valves of a mixture open or closed by the rates of their drives in its model in which all are open.
+
+    When one opens, the models take over what that model knows, and a sudden load is as good as excluded, see `interact`.
+    """
     n, drive, opened = p.drives.shape[0], drive_place(p), False
     first, is_open, still = first_model(mixture), f.is_open[mixture], f.still[mixture]
     moving = first + OPEN
     for i in range(n):
         at = drive + n + i
-        odds = log_odds(f.x[moving, at], f.p[moving, at, at], MOVING * MOVING / reach2(p, i))
+        odds = log_odds(f.x[moving, at], f.p[moving, at, at], MOVING * MOVING / max(reach2(p, 2 + i), 1e-9))
         still[i] = still[i] + h if odds < 0.0 else 0.0
         if odds > OPENED and f.chances[moving] > 0.5:
             opened |= is_open[i] == 0
@@ -49,15 +53,9 @@ def log_odds(rate, variance, moving2):
 
     It is the Bayes factor of a rate that is known with `variance`.
     """
-    ratio = moving2 / max(variance, 1e-300)
-    return 0.5 * (rate * rate / max(variance, 1e-300) * ratio / (1.0 + ratio) - math.log(1.0 + ratio))
-
-
-@inner
-def reach2(p, i):
-    """Return the square of the tip's motion by drive `i`."""
-    n = p.drives.shape[0]
-    return max(p.readings[2 + i, n] ** 2 + p.readings[2 + i, n + 1] ** 2, 1e-9)
+    known = max(variance, 1e-300)
+    ratio = moving2 / known
+    return 0.5 * (rate * rate / known * ratio / (1.0 + ratio) - math.log(1.0 + ratio))
 
 
 @inner
@@ -70,7 +68,7 @@ def learn_jerk(p, f, h):
     n = p.drives.shape[0]
     for i in range(n):
         if f.is_open[PREDICTION, i] == 0 and not (p.reads_angle and p.sways[i]):
-            f.jerk[i] = min(2.0 / DRIVE_TIME * OPENING * OPENING / reach2(p, i), MOST_JERK)
+            f.jerk[i] = min(2.0 / DRIVE_TIME * OPENING * OPENING / max(reach2(p, 2 + i), 1e-9), MOST_JERK)
             continue
         at = drive_place(p) + 2 * n + i
         shown = 2.0 / DRIVE_TIME * (f.x[OPEN, at] * f.x[OPEN, at] + f.p[OPEN, at, at])

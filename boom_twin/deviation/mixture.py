@@ -8,7 +8,7 @@ from ..kernels.jit import inner
 from .states import ALL_VALVES, BURST, OPEN, PREDICTION, VALVES, whole
 
 MODELS = BURST + 1  # of a mixture
-LEAST_CHANCE = 1e-9
+LEAST_CHANCE = 1e-9  # of a model, from which it can grow again
 OPENS, CLOSES = 0.3, 1.0  # 1/s, rates at which valves open, and are closed again
 COMES, STAYS = 0.2, 1.0  # 1/s, rates at which a load comes while all valves are closed, and is usual again
 
@@ -34,11 +34,12 @@ def interact(f, mixture, size, h):
 
     No sudden load is expected while a valve is open: another that opens explains the same lengths, and is far likelier.
     """
-    first, switch, closed = first_model(mixture), f.switch, 1
+    first, switch, coming = first_model(mixture), f.switch, COMES
     for i in range(f.is_open.shape[1]):
-        closed *= 1 - f.is_open[mixture, i]
+        if f.is_open[mixture, i] == 1:
+            coming = 0.0
     opens, closes = 1.0 - math.exp(-OPENS * h), 1.0 - math.exp(-CLOSES * h)
-    comes, stays = 1.0 - math.exp(-COMES * closed * h), 1.0 - math.exp(-STAYS * h)
+    comes, stays = 1.0 - math.exp(-coming * h), 1.0 - math.exp(-STAYS * h)
     switch[VALVES, VALVES], switch[VALVES, OPEN], switch[VALVES, BURST] = 1.0 - opens - comes, opens, comes
     switch[OPEN, VALVES], switch[OPEN, OPEN], switch[OPEN, BURST] = closes, 1.0 - closes, 0.0
     switch[BURST, VALVES], switch[BURST, OPEN], switch[BURST, BURST] = stays, opens, 1.0 - stays - opens

@@ -16,7 +16,7 @@ estimate adds zeros of IMU, angle sensors and force sensors, and errors of furth
 
 A closed valve locks the oil, so its drive stands still: that is a reading of rate zero. Three models interact (H. Blom and
 Y. Bar-Shalom, IEEE Trans. Automat. Control 33 (1988), 780-783): valves as they are believed to be; all valves open; valves as
-believed under a load that has just come. Where the second explains the lengths best, valves whose rates differ from zero are
+believed under a load that has just come. Where the second explains the lengths best, valves whose drives move by the odds are
 believed open, until they stand still. The estimate has the same models with the readings of all sensors, and valves of its own.
 
 How far a drive's acceleration changes, and how large the fast load is, is learnt: the variance that a state is expected to have
@@ -42,7 +42,7 @@ from .kalman import (
 )
 from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
 from .mixture import MODELS, copy_model, first_model, interact, mix, weigh_models
-from .rows import SWAY_SHARE, column_row, drive_row, read, variance_of
+from .rows import SWAY_SHARE, column_row, drive_row, reach2, read, variance_of
 from .states import (
     ALL_BURST,
     ALL_VALVES,
@@ -83,7 +83,7 @@ def start_models(p, f, speed, swing):
         covariance[load + 2 + a, load + 2 + a] = noise.first_load * noise.first_load
         covariance[load + 4 + a, load + 4 + a] = f.load2[0, a] / (FAST * FAST)
     for j in range(m):
-        motion2 = p.readings[2 + n + j, n] ** 2 + p.readings[2 + n + j, n + 1] ** 2
+        motion2 = reach2(p, 2 + n + j)
         omega2 = p.omega[j] * p.omega[j]
         off2 = 0.1 * motion2 * f.load2[0, 0] / (omega2 * omega2)
         if j == 0 and motion2 > 0.0:

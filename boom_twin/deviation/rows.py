@@ -51,6 +51,13 @@ def about_rest(p, row, x, size):
 
 
 @inner
+def reach2(p, k):
+    """Return the square of the tip's motion by column `k` of the posture's readings: 2 + i of drive i, modes behind."""
+    n = p.drives.shape[0]
+    return p.readings[k, n] ** 2 + p.readings[k, n + 1] ** 2
+
+
+@inner
 def variance_of(row, covariance, gain, size):
     """Return the variance of the reading of a row; `gain` is scratch."""
     spread_of(row, covariance, gain, size)
