@@ -43,6 +43,7 @@ WRONG = 4.0  # nats per block (2.8 standard deviations) above which a channel is
 KEPT = 8  # stroke explanations compared with all sensors
 MOVED = 0.03  # least change of a stroke that is a move, relative to the largest stroke
 Declared = Mapping[Stream, Sequence[Channel]]
+CubeBuilder = Callable[[Table, Sequence[Channel], Expected, float], Cube]  # such as `angle_cube`
 
 
 class Verdict(NamedTuple):
@@ -189,14 +190,9 @@ class _Checker:
     def _explained(self, strokes: tuple[Channel, ...], prior: float) -> _Explanation:
         expected = self._expected(strokes)
         parts: dict[Stream, _Part] = {}
-        if (angles := self._tables.get(Stream.ANGLES)) is not None:
-            own = self._declared[Stream.ANGLES]
-            parts[Stream.ANGLES] = self._part(Stream.ANGLES, expected, lambda: angle_cube(angles, own, expected, self._weight))
-        if (forces := self._tables.get(Stream.FORCES)) is not None:
-            of_forces = self._declared[Stream.FORCES]
-            parts[Stream.FORCES] = self._part(
-                Stream.FORCES, expected, lambda: force_cube(forces, of_forces, expected, self._weight)
-            )
+        for stream, cube_of in ((Stream.ANGLES, angle_cube), (Stream.FORCES, force_cube)):
+            if stream in self._tables:
+                parts[stream] = self._part(stream, expected, cube_of)
         for stream, gravity in expected.gravity.items():
             imu, axes = self._tables.get(stream), self._declared[stream]
             if imu is not None and axes and all(each.name in imu.names for each in axes):
@@ -228,16 +224,16 @@ class _Checker:
         self._to_other_boom = other - best
         self.is_other_boom = min(best, unset) - other >= SURE
 
-    def _part(self, stream: Stream, expected: Expected, cube_of: Callable[[], Cube]) -> _Part:
+    def _part(self, stream: Stream, expected: Expected, cube_of: CubeBuilder) -> _Part:
         doubtful = 1.0  # nats per block above which other ways are compared, as an error may show in few postures
-        declared, names = self._declared[stream], self._tables[stream].names
-        costs = declared_costs(stream, self._tables[stream], declared, expected, self._weight)
-        is_known = {each.name for each in declared}.issuperset(names)
+        declared, table = self._declared[stream], self._tables[stream]
+        costs = declared_costs(stream, table, declared, expected, self._weight)
+        is_known = {each.name for each in declared}.issuperset(table.names)
         wrong = [not is_known if cost is None else cost > WRONG * self._weight for cost in costs]
         if self._is_quick or not any(cost is None or cost > doubtful * self._weight for cost in costs):
             total = sum(cost or 0.0 for cost in costs)
             return _Part(total, tuple(declared), tuple(wrong), tuple(not each for each in wrong), lambda j: np.inf)
-        cube = cube_of()
+        cube = cube_of(table, declared, expected, self._weight)
         cases = [(extra, common_costs(cube, unit, is_reversed)) for extra, unit, is_reversed in self._common(stream)]
         solved = [(extra + (found := assigned(each))[0], number, found[1]) for number, (extra, each) in enumerate(cases)]
         cost, number, places = min(solved, key=lambda each: each[:2])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import permutations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -249,28 +250,24 @@ def gravity_hypotheses(table: Table, declared: Sequence[Channel], gravity: Array
     places = {name: a for a, name in enumerate(table.names)}
     is_read = np.isfinite(table.values[:, [places[each.name] for each in declared]]).all(axis=1)
     right, found = gravity[is_read], list[GravityHypothesis]()
-    for x in table.names:
-        for z in table.names:
-            if x == z:
-                continue
-            for unit in units:
-                for flip_x, flip_z in ((1, 1), (-1, 1), (1, -1), (-1, -1)):
-                    one = declared[0]._replace(name=x, unit=unit, sign=flip_x * declared[0].sign)
-                    two = declared[1]._replace(name=z, unit=unit, sign=flip_z * declared[1].sign)
-                    f = si(one, units, table.values[is_read, places[x]]) + 1j * si(two, units, table.values[is_read, places[z]])
-                    spread = np.hypot(table.spreads[is_read, places[x]], table.spreads[is_read, places[z]]) * units[unit]
-                    sigma = np.hypot(gravity_error, spread)
-                    f = f * np.exp(1j * one.turned)
-                    cost = (UNIT if unit != declared[0].unit else 0.0) + (SIGN if min(flip_x, flip_z) < 0 else 0.0)
-                    cost += NAME if (x, z) != (declared[0].name, declared[1].name) else 0.0
-                    found.append(GravityHypothesis(cost + float(misfit(np.abs(f - right) / sigma, weight)), (one, two)))
-                    if flip_z < 0 or places[x] > places[z]:  # equals a rotation of another pair
-                        continue
-                    turn = float(np.angle(np.nansum(right * f.conj())))
-                    if abs(math.remainder(turn, math.pi / 2.0)) > NEAR_ZERO:
-                        off = np.abs(f * np.exp(1j * turn) - right) / sigma
-                        pair = one._replace(turned=one.turned + turn), two._replace(turned=two.turned + turn)
-                        found.append(GravityHypothesis(cost + TURNED + float(misfit(off, weight)), pair))
+    signs = (1, 1), (-1, 1), (1, -1), (-1, -1)
+    for (x, z), unit, (flip_x, flip_z) in product(permutations(table.names, 2), units, signs):
+        one = declared[0]._replace(name=x, unit=unit, sign=flip_x * declared[0].sign)
+        two = declared[1]._replace(name=z, unit=unit, sign=flip_z * declared[1].sign)
+        f = si(one, units, table.values[is_read, places[x]]) + 1j * si(two, units, table.values[is_read, places[z]])
+        spread = np.hypot(table.spreads[is_read, places[x]], table.spreads[is_read, places[z]]) * units[unit]
+        sigma = np.hypot(gravity_error, spread)
+        f = f * np.exp(1j * one.turned)
+        cost = (UNIT if unit != declared[0].unit else 0.0) + (SIGN if min(flip_x, flip_z) < 0 else 0.0)
+        cost += NAME if (x, z) != (declared[0].name, declared[1].name) else 0.0
+        found.append(GravityHypothesis(cost + float(misfit(np.abs(f - right) / sigma, weight)), (one, two)))
+        if flip_z < 0 or places[x] > places[z]:  # equals a rotation of another pair
+            continue
+        turn = float(np.angle(np.nansum(right * f.conj())))
+        if abs(math.remainder(turn, math.pi / 2.0)) > NEAR_ZERO:
+            off = np.abs(f * np.exp(1j * turn) - right) / sigma
+            pair = one._replace(turned=one.turned + turn), two._replace(turned=two.turned + turn)
+            found.append(GravityHypothesis(cost + TURNED + float(misfit(off, weight)), pair))
     rest = np.hypot.reduce([table.values[is_read, a] for a in range(len(table.names))], axis=0)
     found.append(GravityHypothesis(NO_GRAVITY + float(misfit(rest / rest_error, weight)), (declared[0], declared[1]), True))
     first = next(i for i, each in enumerate(found) if each.channels == tuple(declared))
