@@ -207,11 +207,11 @@ def bounded_minimum(precision: Array, pull: Array, least: Array) -> Array:
     return np.asarray(lsq_linear(root.T, np.linalg.solve(root, pull), (least, np.inf), "bvls").x)
 
 
-def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callable[[], None]) -> Fit:
-    """Return the fit; `assumed` are parameters taken to be known, `tell` is called before every pass over the sessions."""
+def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callable[[int], None]) -> Fit:
+    """Return the fit; `assumed` are parameters taken to be known, `tell` is given the number of each pass before it."""
     at, stated, furthest, learning = problem.start(), problem.sensor_noise(), np.inf, True
     for passes in range(1, MOST + 1):
-        tell()
+        tell(passes)
         if learning:
             noise = problem.noise(at, stated)
         (base,) = problem.innovations([problem.values(at)], noise)

@@ -130,8 +130,8 @@ def calibrate(
     kept_from, fitting = _parts(sessions)
     progress(0.05, "rests")
     periods = [period for each, until in fitting for period in rest_periods(each, scene, rigging, until)]
-    problem, passes = CalibrationProblem(scene, unknowns, periods, rigging), iter(range(1, 1000))
-    fit = fitted(problem, assumed_of(scene, names), lambda: _tell_pass(progress, next(passes)))
+    problem = CalibrationProblem(scene, unknowns, periods, rigging)
+    fit = fitted(problem, assumed_of(scene, names), lambda k: progress(0.15 + 0.6 * (1.0 - 0.85**k), f"fit, pass {k}"))
     groups = groups_of(problem, fit)
     estimates = _estimates(problem, fit, groups)
     told = {estimate.unknown.name: estimate.value for estimate in estimates if estimate.told}
@@ -149,10 +149,6 @@ def calibrate(
     remarks = (*_remarks(fit, problem.names, estimates, sessions), *([unusable] if unusable else []))
     misfit, judgements = float(fit.misfits.max()), (held_out, before, after, mapped, remarks, unusable)
     return Calibration(better, zeros, estimates, tuple(groups), misfit, fit.passes, tuple(sessions), *judgements)
-
-
-def _tell_pass(progress: Progress, number: int) -> None:
-    progress(0.15 + 0.6 * (1.0 - 0.85**number), f"fit, pass {number}")
 
 
 def common_reading(paths: Sequence[Path], mapped: Mapped) -> StrokeReading:

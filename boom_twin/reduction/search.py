@@ -14,6 +14,7 @@ import heapq
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -188,18 +189,12 @@ class _Search:
         if self.full.status != "ok":
             raise SolverError(f"the full model itself fails: {self.full.status}")
         self.known: dict[tuple[Edit, ...], Deviation] = {}
-        self.sizes: dict[tuple[Edit, ...], float] = {}
+        self.size = cache(lambda edits: size(edited(full, edits)))  # of the full scene after `edits`, see `reduction.deviation`
         self.next: tuple[str, float] | None = None
 
     def model(self) -> Scene:
         """The present model."""
         return edited(self.scene, self.edits)
-
-    def size(self, edits: tuple[Edit, ...]) -> float:
-        """Return the size of the full scene after `edits`, see `reduction.deviation`."""
-        if edits not in self.sizes:
-            self.sizes[edits] = size(edited(self.scene, edits))
-        return self.sizes[edits]
 
     def measured(self, edits: tuple[Edit, ...]) -> Deviation:
         """Return the deviation of the scene after `edits` from the full one."""

@@ -137,7 +137,11 @@ class Player:
                 began += self._wait(max(began + due, sent + (due - previous) / CATCH_UP), stamp, is_held)
                 sent, previous = time.monotonic(), due
                 self.latest = max(self.latest, sent - began - due)
-                self._publish(name, data)
+                if name == CLOCK and self._clock is not None:
+                    self._clock.publish(data)
+                else:
+                    self._publishers[name].publish(data)
+                    self.sent[name] += 1
                 yield stamp - first
         finally:
             self.wall += time.monotonic() - entered
@@ -180,13 +184,6 @@ class Player:
     def close(self) -> None:
         """Destroy the player's node and publishers."""
         self._node.destroy_node()
-
-    def _publish(self, name: str, data: bytes | Clock) -> None:
-        if name == CLOCK and self._clock is not None:
-            self._clock.publish(data)
-            return
-        self._publishers[name].publish(data)
-        self.sent[name] += 1
 
     def _schedule(self, first: int, end: int, rate: float) -> Iterator[tuple[int, str, bytes | Clock]]:
         """Yield log time (ns), topic and message (CDR, or Clock) of the span in order."""

@@ -62,8 +62,6 @@ def declare(node: Node) -> None:
     or no more.
     """
     given = node._parameter_overrides  # rclpy has no public way to see those that were not declared
-    for name in sorted(given.keys() & RETIRED.keys()):
-        raise UsageError(f"{SOURCE}: {name}: {RETIRED[name]}. See msg_config/twin.yaml.")
     try:
         for row in TABLE:
             node.declare_parameter(row.name, row.default, _descriptor(row))
@@ -81,7 +79,8 @@ def _unknown(node: Node, names: Iterable[str]) -> str:
     """Return an error text on those of `names` that are no parameters; empty if all are."""
     # rclpy declares QoS overrides with their topics
     unknown = sorted(name for name in names if not (node.has_parameter(name) or name.startswith("qos_overrides.")))
-    return "; ".join(f"{name}: unknown. The nearest is `{nearest(name, [row.name for row in TABLE])}`" for name in unknown)
+    known = [row.name for row in TABLE]
+    return "; ".join(f"{name}: {RETIRED.get(name) or f'unknown. The nearest is `{nearest(name, known)}`'}" for name in unknown)
 
 
 def refusal(node: Node, parameters: Iterable[Parameter[Any]]) -> str:

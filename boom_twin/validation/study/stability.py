@@ -128,19 +128,9 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     if posture is not None:
         scene = scene.model_copy(update={"postures": {posture: section_angles(scene, posture)}})
     chosen = [case for case in cases(scene) if case.quick or not quick]
-    rows = run(chosen, METHODS)
-    return write_files(out, rows, move_in_words(scene))
-
-
-def _title(case: Case) -> str:
-    return f"{case.group}: {case.name}"
-
-
-def write_files(out: Path, rows: list[CaseResult], move: str) -> list[Path]:
-    """Write all files; `move` tells of the scene's motion."""
-    paths = [out / f"stability.{kind}" for kind in ("json", "md")]
+    rows, paths = run(chosen, METHODS), [out / f"stability.{kind}" for kind in ("json", "md")]
     write_json(paths[0], _content(rows))
-    write_atomic(paths[1], text(rows, move))
+    write_atomic(paths[1], text(rows, move_in_words(scene)))
     return paths
 
 
@@ -177,7 +167,7 @@ def _counts(rows: Sequence[CaseResult]) -> str:
 def _default(rows: Sequence[CaseResult]) -> str:
     found = [(row.case, row.cells["default"].verdict) for row in rows]
     return "".join(
-        f"- {_title(case)} ({case.varied}): {own.mark}; {own.symptom.partition('. ')[0]}.\n"
+        f"- {case.group}: {case.name} ({case.varied}): {own.mark}; {own.symptom.partition('. ')[0]}.\n"
         for case, own in found
         if own.word != "holds"
     )
