@@ -10,7 +10,7 @@ from compiled import compile_scene
 from kernels.journal import Journal, bearing, memory, row
 from oracle import booms
 from oracle.clearance import drop
-from oracle.clearance.drop import restitution
+from oracle.clearance.drop import PUBLISHED, restitution
 from oracle.clearance.scenes import RODS, with_pins
 from oracle.clearance.slider_crank import demonstration
 from scipy.integrate import solve_ivp
@@ -21,10 +21,6 @@ from boom_twin.validation.contact_law import HYSTERESIS, Contact
 
 WITHIN = 0.005  # of a coefficient of restitution
 rng = np.random.default_rng(4)
-PUBLISHED = [
-    *(("lankarani-nikravesh", e, kept) for e, kept in ((0.95, 0.954), (0.9, 0.913), (0.8, 0.847), (0.5, 0.725), (0.3, 0.684))),
-    *(("flores", e, kept) for e, kept in ((0.9, 0.894), (0.8, 0.789), (0.5, 0.470))),
-]
 MASS = 20.0  # kg
 
 

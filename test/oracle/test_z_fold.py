@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import booms, segments
-from oracle.oscillation import mean_frequency
 
 pytest.importorskip("exudyn")
 
@@ -64,17 +63,6 @@ def test_motion_is_that_of_exudyn():
     assert np.linalg.norm(found.tip[:, :2] - rows["tip"], axis=1).max() < 2e-3
     forces = rows["forces"]
     assert found.cylinder_forces == pytest.approx(forces, abs=5e-3 * np.abs(forces).max())
-
-
-def test_first_frequency_is_that_of_exudyn():
-    """Rising zero crossings of the tip, freely swinging by some centimetres."""
-    scene = z_fold()
-    first = strokes_of_posture(scene, "reach")
-    drive = rig.Programme(tuple(first), (rig.Move(0, 0.0, 1.2, first[0] + 2e-3),))
-    rows, _ = rig.move(rig.at_rest(scene, first, 6, nodally_exact=True), drive, 16.0, 5e-3, 5e-3)
-    free = rows["t"] > 3.0
-    frequency = mean_frequency(rows["t"][free], rows["tip"][:, 1][free])
-    assert frequency == pytest.approx(statics(scene, drive(np.array([2.0]))[0][0], modes=1).frequencies[0], rel=5e-3)
 
 
 def one_section(**cylinder):

@@ -194,3 +194,18 @@ def test_work_of_the_drives_is_the_rise_of_the_potential(number):
             _, boom, _, _ = segments.equilibrium(model, length, angles)
             energies.append(segments.energy(model, boom, length)[0].v)
         assert -(energies[0] - energies[1]) / 2e-4 == pytest.approx(forces[i], rel=5e-3, abs=1.0)
+
+
+def test_a_split_without_force_changes_nothing():
+    """The barrel pin of a weightless section splits the beam or, on the head, does not: the beam bends alike."""
+    pivots = []
+    for c in ([-1.5, 0.15], [-0.22, 0.55]):
+        spec = booms.document()
+        spec |= {"sections": spec["sections"][:2], "joints": spec["joints"][:2], "postures": {"down": [0.0, -60.0]}}
+        spec["joints"][1] |= {"C": c, "cylinder": {"k": 3e7, "closed_length": 0.3, "max_stroke": 3.0}, "mL": 0.0, "mR": 0.0}
+        spec["sections"][1] = {"length": 3.3}
+        found = statics(booms.scene_of(spec), posture="down", modes=0)
+        pivots.append(found.outline[-2])
+        assert np.linalg.norm(found.tip - pivots[-1]) == pytest.approx(3.3)
+    assert pivots[0][1] < -2e-3  # it does sag
+    assert pivots[0] == pytest.approx(pivots[1], abs=1e-9)

@@ -15,6 +15,11 @@ from reference.worn_pin.impacts import follow
 from scipy.optimize import brentq
 
 APPROACH = 100.0  # smoothing lengths, from where a smoothed contact is out of reach
+PUBLISHED = [
+    *zip(["lankarani-nikravesh"] * 5, (0.95, 0.9, 0.8, 0.5, 0.3), (0.954, 0.913, 0.847, 0.725, 0.684), strict=True),
+    *zip(["flores"] * 3, (0.9, 0.8, 0.5), (0.894, 0.789, 0.470), strict=True),
+]
+"""Law, the coefficient of restitution that it is asked for, and the one that it is known to leave."""
 
 
 def rebound(contact, mass, speed, tolerance=1e-10):

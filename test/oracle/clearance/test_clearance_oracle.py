@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 from oracle import booms, lagrange, segments
 from oracle.clearance import rigid
-from oracle.clearance.drop import rebound, restitution
+from oracle.clearance.drop import PUBLISHED, rebound, restitution
 from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
 
 from boom_twin.validation.contact_law import HYSTERESIS, Contact, stiffness
 
 STEEL = stiffness(0.030, 1e-4, 2.06e11, 0.3)
-PUBLISHED = [
-    *zip(["lankarani-nikravesh"] * 5, (0.95, 0.9, 0.8, 0.5, 0.3), (0.954, 0.913, 0.847, 0.725, 0.684), strict=True),
-    *zip(["flores"] * 3, (0.9, 0.8, 0.5), (0.894, 0.789, 0.470), strict=True),
-]
 
 
 @pytest.mark.parametrize("law, e, expected", PUBLISHED)

@@ -9,12 +9,19 @@ from default_boom import stroke_curve
 pytest.importorskip("exudyn")
 
 from default_boom import joint_angles_of_strokes, strokes_of_posture
-from oracle.oscillation import mean_frequency
 
 from boom_twin import Scene
 from boom_twin.validation.rig import Move, Programme, simulate, statics
 
 G = 9.81
+
+
+def mean_frequency(times, signal):
+    """Of the rising zero crossings of a signal about its mean (Hz)."""
+    signal = signal - signal.mean()
+    rising = np.flatnonzero((signal[:-1] < 0) & (signal[1:] >= 0))
+    crossings = times[rising] - signal[rising] * (times[1] - times[0]) / (signal[rising + 1] - signal[rising])
+    return (len(crossings) - 1) / (crossings[-1] - crossings[0])
 
 
 def length_of_slider_crank(document, angle):
