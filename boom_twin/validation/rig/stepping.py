@@ -42,12 +42,10 @@ class Effort:
 class ParameterChanges:
     """Parameter differences between a boom and fully `changed` ones, with their share (count + 1,) at the start and every step.
 
-    UsageError if a changed boom has other parts, or the boom is lumped (its masses are loads).
+    The boom is not lumped: there, masses are loads. UsageError if a changed boom has other parts.
     """
 
     def __init__(self, boom: Boom, changed: Sequence[tuple[Boom, Array]]) -> None:
-        if changed and boom.lumps:
-            raise UsageError("A lumped boom cannot change while it moves. Build it with lumped=False.")
         self._system, self._shares = boom.system, [share for _, share in changed]
         now = _objects(boom)
         self._healthy: dict[int, dict[str, float]] = {}
