@@ -22,11 +22,7 @@ def course(scene, span=1.0):
 
 
 def test_a_flexible_boom_in_motion():
-    """A fourth of the gaps at half the step; damping takes what decay takes, far more than the gap."""
-    coarse, fine = (energy_balance(course(SCENE), step) for step in (2e-3, 1e-3))
-    assert 3.3 < coarse.gap / fine.gap < 4.7
-    assert fine.share < 2e-5 and fine.damping > 20.0 * fine.gap and fine.contact == 0.0
-    assert fine.work == pytest.approx(fine.change + fine.damping, rel=1e-4)
+    """A fourth of the gaps at half the step, as `test_energy` finds for energy."""
     coarse, fine = (momentum_balance(course(SCENE), step) for step in (2e-3, 1e-3))
     assert 3.3 < coarse.linear_gap / fine.linear_gap < 4.7 and 3.3 < coarse.angular_gap / fine.angular_gap < 4.7
     assert 0.0 < fine.linear_share < 1e-6 and 0.0 < fine.angular_share < 1e-6

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from compiled import RHO, compile_scene, settle, width_of
-
-from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
-from boom_twin.kernels.integrators import GENERALISED_ALPHA
-from boom_twin.kernels.transfer.time_step import observe, run
+from compiled import RHO, compile_scene, settle, stepped
 
 
 def smooth_drive(start, travel, duration):
@@ -32,14 +28,5 @@ def follow(scene, drive, angles, step, count, every=1, rho=RHO):
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, drive(0.0)[0] - plan.closed_lengths, angles)
-    rows = np.empty((count // every + 1, width_of(plan)))
-    observe(plan.tables, state, rows[0])
-    times = step * np.arange(1, count + 1)[:, None]
-    lengths, rates, _ = drive(times)
-    steps, counts = np.full(count // every, step), np.full(count // every, every, dtype=np.int64)
-    status, _, _, _, _ = run(
-        plan.tables, state, work, steps, counts, lengths, rates, np.zeros((0, 2)), GENERALISED_ALPHA, rho, STEP_TOLERANCE,
-        PASSES, None, rows[1:],
-    )  # fmt: skip
-    assert status == 0
-    return rows
+    lengths, rates, _ = drive(step * np.arange(1, count + 1)[:, None])
+    return stepped(plan, state, work, step, every, lengths, rates, rho)

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from compiled import compile_scene, settle, stepped
 from convergence.balances import Energies
 from default_boom import posture_angles, strokes_of_posture
 from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
 
-from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
-from boom_twin.analysis.equilibrium import settle
-from boom_twin.analysis.simulate import RHO
-from boom_twin.compiler.compile import compile_scene
-from boom_twin.compiler.plan import width_of
 from boom_twin.kernels.elements.pin_contact import LOST
-from boom_twin.kernels.integrators import GENERALISED_ALPHA
-from boom_twin.kernels.transfer.time_step import run
 
 LONG = {1e-3: 2000, 1e-4: 5000, 1e-5: 5000}
 PULSE, DURATION = np.array([0.03, -0.02, 0.03, 0.02]), 0.4  # m, s: a jerk of all four cylinders
@@ -61,12 +55,7 @@ class Closed:
         return worst / self.first, self.energy() / self.first, int(self.state.contacts[:, LOST].sum())
 
     def _run(self, drives, rates):
-        out, count = np.zeros((1, width_of(self.plan))), np.array([len(drives)])
-        status, *_ = run(
-            self.plan.tables, self.state, self.work, np.array([self.step]), count, drives, rates, np.zeros((0, 2)),
-            GENERALISED_ALPHA, RHO, STEP_TOLERANCE, PASSES, None, out,
-        )  # fmt: skip
-        assert status == 0, status
+        stepped(self.plan, self.state, self.work, self.step, len(drives), drives, rates)
 
 
 @pytest.mark.parametrize("step", LONG)

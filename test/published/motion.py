@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import compiled
 import numpy as np
-from compiled import RHO, Plan, compile_scene, set_undeformed, taken_apart, width_of
+from compiled import RHO, Plan, compile_scene, set_undeformed, taken_apart
 
 from boom_twin.analysis.drive import PASSES
 from boom_twin.kernels.integrators import DEPTH, GENERALISED_ALPHA, HAT, NEW_A, A, P, Scheme, X, new_weights
 from boom_twin.kernels.tables import State, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
-from boom_twin.kernels.transfer.time_step import advance, observe, run
+from boom_twin.kernels.transfer.time_step import advance
 
 INSTANT = 1e-4  # s, over which accelerations at rest are found; their relative error is about its square
 TOLERANCE = 1e-11  # rad in the last pass of a step
@@ -58,20 +59,12 @@ def stepped(start, step, count, every, drive=None, rho=RHO):
     `drive` gives lengths (m) and rates (m/s) of the cylinders, each (m, n), at times (m,); without it they keep their length.
     """
     plan, state, work = start.plan, State(*(array.copy() for array in start.state)), start.work
-    rows = np.empty((count // every + 1, width_of(plan)))
-    observe(plan.tables, state, rows[0])
     if drive is None:
         lengths = np.tile(start.lengths, (count, 1))
         rates = np.zeros_like(lengths)
     else:
         lengths, rates = drive(step * np.arange(1, count + 1))
-    steps, counts = np.full(count // every, step), np.full(count // every, every, dtype=np.int64)
-    status, row, *_ = run(
-        plan.tables, state, work, steps, counts, lengths, rates, np.zeros((0, 2)), GENERALISED_ALPHA, rho, TOLERANCE, PASSES,
-        None, rows[1:],
-    )  # fmt: skip
-    assert status == 0, f"status {status} in row {row}"
-    return taken_apart(plan, rows).tip
+    return taken_apart(plan, compiled.stepped(plan, state, work, step, every, lengths, rates, rho, TOLERANCE)).tip
 
 
 def halved(start, step, duration, rows, drive=None, halvings=3, rho=RHO):

@@ -32,13 +32,23 @@ class PlacedBodies:
 
 
 @dataclass(frozen=True)
-class Lever:
-    """A rigid body on a pivot with the bush on itself; `pin`, `tip` and the body in its own axes."""
+class Turning:
+    """A rigid body on a pivot; the body and `tip` in its own axes."""
 
     pivot: complex
     body: Mass
-    pin: complex
     tip: complex
+
+    def tip_at(self, phi: float) -> complex:
+        """Return the place of the tip, complex, m."""
+        return self.pivot + self.tip * exp(1j * phi)
+
+
+@dataclass(frozen=True)
+class Lever(Turning):
+    """A rigid body on a pivot with the bush on itself; `pin` in its own axes."""
+
+    pin: complex
 
     def at(self, phi: float) -> PlacedBodies:
         """See `PlacedBodies`."""
@@ -46,20 +56,13 @@ class Lever:
         bodies = [(self.body, Point(self.pivot, 0j, 0j) + turn.arm(self.body.at), turn)]
         return _placed(bodies, Point(self.pivot, 0j, 0j) + turn.arm(self.pin))
 
-    def tip_at(self, phi: float) -> complex:
-        """Return the place of the tip, complex, m."""
-        return self.pivot + Turn(phi, 1.0, 0.0).arm(self.tip).value
-
 
 @dataclass(frozen=True)
-class SixBar:
+class SixBar(Turning):
     """A rigid body on a pivot of a fixed head with heading `before`, the bush on its linkage; `joint` as in a scene's file."""
 
-    pivot: complex
-    body: Mass
     joint: Document
     before: float
-    tip: complex
 
     def at(self, phi: float) -> PlacedBodies:
         """See `PlacedBodies`."""
@@ -73,10 +76,6 @@ class SixBar:
             (Mass(other, other * short**2 / 12.0, 0j), self._fixed(on_right(joint, angle, right, 0.5 * short)), right),
         ]
         return _placed(bodies, self._fixed(rod_pin(joint, angle, left, right)))
-
-    def tip_at(self, phi: float) -> complex:
-        """Return the place of the tip, complex, m."""
-        return self.pivot + Turn(phi, 1.0, 0.0).arm(self.tip).value
 
     def _fixed(self, point: Point) -> Point:
         return point.seen_from(self.pivot, self.before)

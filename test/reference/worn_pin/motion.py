@@ -206,9 +206,9 @@ def freed(document: Document, headings: Sequence[float] | np.ndarray, index: int
     tip = (places[-1] - places[index]) * exp(-1j * headings[index])
     part: Lever | SixBar
     if index == 0:
-        part = Lever(places[0], body, complex(*document["sections"][0]["rod_pin"]), tip)
+        part = Lever(places[0], body, tip, complex(*document["sections"][0]["rod_pin"]))
     else:
-        part = SixBar(places[index], body, joint, headings[index - 1], tip)
+        part = SixBar(places[index], body, tip, joint, headings[index - 1])
     cylinder, pin = joint["cylinder"], geometry.pins(document, headings, index)[0]
     barrel, rod = ([p["mass"], p["inertia"], p["com"]] for p in (cylinder["barrel"], cylinder["rod"]))
     oil = OilCylinder(pin, cylinder["k"], cylinder.get("d", 0.0), *barrel, *rod)
