@@ -20,7 +20,7 @@ from ..config.settings import Settings
 from ..messages.cdr_decoder import CdrDecoder, MessageBlock, stamp_in
 from ..messages.report_encoder import ReportEncoder, decode_changes
 from ..messages.sample_decoder import SampleDecoder
-from ..messages.topic_table import TYPES, Output, Topic, Topics
+from ..messages.topic_table import Output, Topic, Topics
 from ..messages.type_store import decode
 from ..scene.schema import Scene
 from ..twin.blocks import CODES, Integers, ReportBlock, SampleBlock, block_of, samples_in
@@ -164,7 +164,7 @@ class SessionSamples:
 
 
 def decoder_of(streams: list[Stream]) -> CdrDecoder:
-    return CdrDecoder(TYPES[streams[0]], decode, SENSORS[streams[0]].field)
+    return CdrDecoder(SENSORS[streams[0]].message, decode, SENSORS[streams[0]].field)
 
 
 ITEMS_AHEAD = 8  # blocks of samples, or of reports, that wait between two threads
