@@ -14,18 +14,7 @@ from pydantic_core import ErrorDetails
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError, listed
 from ..types import NUMBERED_SIDE, SENSORS, Stream, sensor_kind, stream_of
-from .topic_table import (
-    InputTopic,
-    Qos,
-    Sensor,
-    SensorPlace,
-    Topic,
-    Topics,
-    default_document,
-    load_topics,
-    used_inputs,
-    usual,
-)
+from .topic_table import InputTopic, Qos, Sensor, SensorPlace, Topic, Topics, default_document, load_topics, used_inputs, usual
 
 NO_LAG = frozenset({Stream.FORCES, Stream.PRESSURES, Stream.MOMENTS})  # zeros that change with the posture hide a lag
 
