@@ -9,8 +9,9 @@ import numpy as np
 from boom_twin import Stream
 from boom_twin.messages.report_encoder import ReportEncoder, decode_changes, decode_health, encode_changes, encode_health
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
-from boom_twin.messages.topic_table import TYPES, Output, Qos, Topic, Topics, every_input, load_topics
+from boom_twin.messages.topic_table import Output, Qos, Topic, Topics, every_input, load_topics, type_of
 from boom_twin.messages.type_store import PADDING, decode, fill_header, jazzy, new_message
+from boom_twin.types import SENSORS
 
 __all__ = [
     "IMU", "JOINT_STATE", "PADDING", "TYPES", "Output", "Qos", "ReportEncoder", "SampleDecoder", "Topic", "Topics",
@@ -18,6 +19,10 @@ __all__ = [
     "fill_header", "imu", "jazzy", "joint_state", "load_topics", "new_message", "stamp_of",
 ]  # fmt: skip
 
+TYPES: dict[Stream | Output, str] = {
+    **{stream: kind.message for stream, kind in SENSORS.items()},
+    **{output: type_of(output) for output in Output},
+}
 JOINT_STATE, IMU = TYPES[Stream.STROKES], TYPES[Stream.IMU]
 
 

@@ -120,7 +120,7 @@ def publishable(session: Session, names: Sequence[str] | None = None) -> list[Pu
         chosen = {
             topic.name: check_topic(session, topic.name, topic.type)
             for stream, topic in topics.inputs.items()
-            if stream is topics.stroke_reading.stream or ((there := session.find(topic.name)) is not None and there.count)
+            if stream is topics.stroke_reading.stream or session.count(topic.name)
         }
     else:
         found = [check_topic(session, name, getattr(session.find(name), "type", "")) for name in names]
@@ -171,9 +171,8 @@ def conflicts(session: Session, topics: Topics, joints: int, scene: str) -> Iter
     are ignored.
     """
     drive, strokes, angles = topics.stroke_reading.stream, topics.inputs.get(Stream.STROKES), topics.inputs[Stream.ANGLES]
-    heard = session.find(angles.name)
-    if strokes is not None and heard is not None and heard.count and not getattr(session.find(strokes.name), "count", 0):
-        yield f"no strokes ({strokes.absolute}), but {heard.count} messages of {angles.absolute}. {DRIVE_REMEDY}"
+    if strokes is not None and (heard := session.count(angles.name)) and not session.count(strokes.name):
+        yield f"no strokes ({strokes.absolute}), but {heard} messages of {angles.absolute}. {DRIVE_REMEDY}"
     names = _names_read(session, topics, joints)
     for stream, found in names.items():
         if beyond := topics.beyond(stream, joints, found):
@@ -224,7 +223,7 @@ def _counted(number: int, kind: str) -> str:
 def _names_read(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[str, None]]:
     """Return the names in messages of strokes and angles, read for 5 s and until all driving sensors are named."""
     heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.heard.items()}
-    present = {name: streams for name, streams in heard.items() if streams and (t := session.find(name)) and t.count}
+    present = {name: streams for name, streams in heard.items() if streams and session.count(name)}
     if not present:
         return {}
     found: dict[Stream, dict[str, None]] = {stream: {} for streams in present.values() for stream in streams}

@@ -179,6 +179,10 @@ class Session:
         """Return a topic by its name, with or without its leading slash; None if it is missing."""
         return next((topic for topic in self.topics if topic.name.lstrip("/") == name.lstrip("/")), None)
 
+    def count(self, name: str) -> int:
+        """Return the number of messages of a topic; 0 if it is missing."""
+        return sum(topic.count for topic in self.topics if topic.name.lstrip("/") == name.lstrip("/"))
+
 
 def files_sha256(session: Session) -> str:
     """Return the SHA-256 over the SHA-256 digests of the files of a session, in their order."""

@@ -17,18 +17,7 @@ from mcap.records import Chunk
 from mcap.writer import MCAP0_MAGIC
 
 from ..system.received_files import open_received
-from .mcap_records import (
-    BLOCK,
-    KINDS,
-    MESSAGE_HEAD,
-    MOST_HELD,
-    PREFIX,
-    bounds,
-    record_of,
-    unpack,
-    unpack_start,
-    whole_parts,
-)
+from .mcap_records import BLOCK, KINDS, MESSAGE_HEAD, MOST_HELD, PREFIX, bounds, record_of, unpack, unpack_start, whole_parts
 from .session_file import PARSE_ERRORS
 
 _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)

@@ -107,18 +107,6 @@ def kept(session: Path, key: str, option: str) -> KeptText | None:
     return KeptText(text, f"{path}, {key}") if text else None
 
 
-def kept_parameters(session: Path) -> tuple[dict[str, Any], str]:
-    """Return the parameters of the twin that ran beside a recording, and a description of their place; empty without a twin.
-
-    Raise BagError if ``session.yaml`` cannot be read, or holds something else there.
-    """
-    path, remedy = sheet_path(session), "Move it away, or give the parameters by --params."
-    values = _value(path, "twin", remedy)
-    if not isinstance(values, dict | None):
-        raise BagError(f"{path}, twin: not a block of names and values, as `boom_twin record` writes it. {remedy}")
-    return values or {}, f"{path}, twin"
-
-
 def missed_messages(session: Path) -> dict[str, int]:
     """Return the number of messages that never reached the recorder, by topic, as counted at its end; only those above 0."""
     try:
@@ -288,12 +276,15 @@ def settings_of(session: Path, given: Path | None = None, namespace: str = "") -
     """Return the settings of a session's twin.
 
     The source is the parameter file `given` for the node in `namespace`, else the node that ran during the recording, else the
-    package.
+    package. Raise BagError if ``session.yaml`` cannot be read, or holds something else there.
     """
     if given is not None:
         return SessionSettings(load_settings(given, namespace), str(given))
-    values, source = kept_parameters(session)
-    own = {name: value for name, value in values.items() if name in Settings.model_fields}  # the rest belongs to the node
+    path, remedy = sheet_path(session), "Move it away, or give the parameters by --params."
+    values, source = _value(path, "twin", remedy), f"{path}, twin"
+    if not isinstance(values, dict | None):
+        raise BagError(f"{source}: not a block of names and values, as `boom_twin record` writes it. {remedy}")
+    own = {name: value for name, value in (values or {}).items() if name in Settings.model_fields}  # the rest is the node's
     try:
         return SessionSettings(checked(Settings, own, source), source if own else DEFAULT_PARAMETERS)
     except UsageError as error:

@@ -58,11 +58,7 @@ class BagWriter:
     """
 
     def __init__(
-        self,
-        directory: Path,
-        notes: Mapping[str, str] | None = None,
-        distro: str = "jazzy",
-        chunk_size: int | None = None,
+        self, directory: Path, notes: Mapping[str, str] | None = None, distro: str = "jazzy", chunk_size: int | None = None
     ) -> None:
         self.directory, self._distro = directory, distro
         self._chunk_size = chunk_size or CHUNK_SIZE

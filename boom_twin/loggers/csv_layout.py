@@ -51,19 +51,9 @@ _WORDS = {
     Stream.IMU: ("accel", "beschl", "imu", r"\bacc\b"),
     Stream.ANGLES: ("joint", "gelenk", "winkel", "angle", "encoder", "drehgeber"),
     Stream.STROKES: (
-        "cylinder",
-        r"\bcyl",
-        "zylinder",
-        r"\bzyl",
-        "stroke",
-        "length",
-        "piston",
-        "hub",
-        "laenge",
-        r"\bweg\b",
-        "kolben",
+        "cylinder", r"\bcyl", "zylinder", r"\bzyl", "stroke", "length", "piston", "hub", "laenge", r"\bweg\b", "kolben",
     ),
-}
+}  # fmt: skip
 """Patterns of the words for each stream."""
 _OVER = (Stream.FORCES, Stream.IMU)  # streams that take precedence if a header names several, as in 'cylinder force'
 _NOT_READINGS = (

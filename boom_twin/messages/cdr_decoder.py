@@ -14,8 +14,7 @@ import numpy as np
 from mcap.records import Schema
 from numpy.typing import NDArray
 
-from ..types import SECOND, Stream
-from .topic_table import TYPES
+from ..types import SECOND, SENSORS, Stream
 from .type_store import PADDING, decode, text_in
 
 Integers = NDArray[np.int64]
@@ -122,6 +121,7 @@ def _string(data: bytes, place: int, length: struct.Struct) -> tuple[str, int]:
 
 
 _LITTLE = b"\x00\x01"
+_JOINT_STATE, _IMU = (SENSORS[stream].message for stream in (Stream.STROKES, Stream.IMU))
 _ARRAYS = ("position", "velocity", "effort")
 _HEAD = _ORIGIN + 8  # behind the stamp
 _IMU_NUMBERS, _BEFORE_RATE, _BEFORE_FORCE = 37, 13, 25  # doubles of an Imu, and those before its vectors
@@ -170,8 +170,8 @@ class CdrDecoder:
         Raise ValueError, or what `decode` raises, if the message is not whole.
         """
         most_heads = 8  # number of heads kept for one topic: a bus may send every joint in a message of its own
-        is_imu = self._type == TYPES[Stream.IMU]
-        is_little = data[:2] == _LITTLE and (is_imu or self._type == TYPES[Stream.STROKES])
+        is_imu = self._type == _IMU
+        is_little = data[:2] == _LITTLE and (is_imu or self._type == _JOINT_STATE)
         found = None
         if is_little:
             for head, end, text in self._heads:
@@ -190,7 +190,7 @@ class CdrDecoder:
 
     def read_many(self, block: MessageBlock) -> tuple[Integers, Any] | None:
         """Return stamps (ns) and one message with arrays (k,) for numbers; None unless all have one layout, which is known."""
-        first, size, is_imu = block.data(0), int(block.ends[0] - block.starts[0]), self._type == TYPES[Stream.IMU]
+        first, size, is_imu = block.data(0), int(block.ends[0] - block.starts[0]), self._type == _IMU
         known = next((each for each in self._heads if first[_HEAD : each[1]] == each[0]), None)
         if known is None or first[:2] != _LITTLE or (block.ends - block.starts != size).any():
             return None

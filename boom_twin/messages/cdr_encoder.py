@@ -68,10 +68,11 @@ _DOUBLE, _SINGLE = 0x7E37_E43C_8800_0000, 0x7E96_7600
 
 
 class NumberFields:
-    """Source of placeholders for the numbers of a template, each unique."""
+    """Source of placeholders for the numbers of a template, each unique. `names` are in the order of the named ones."""
 
     def __init__(self) -> None:
         self.doubles = self.singles = 0
+        self.names: list[str] = []
 
     def double(self) -> float:
         """Return the next placeholder of a ``float64``."""
@@ -87,16 +88,21 @@ class NumberFields:
         """Return the next `count` placeholders of ``float64``."""
         return [self.double() for _ in range(count)]
 
+    def named(self, *names: str) -> list[float]:
+        """Return the next placeholders of ``float64``, for numbers with these names."""
+        self.names += names
+        return self.row(len(names))
+
 
 class Template:
     """One or more encoded messages with places for stamps and numbers, filled together.
 
     Each message comes with its type. Its numbers are constants or from `fields`, and its stamps are `STAMP` s. `double_places`
-    are the indices of the fields among the doubles after the first encapsulation.
+    are the indices of the fields among the doubles after the first encapsulation. `names` are those of `fields`.
     """
 
     def __init__(self, messages: Sequence[tuple[str, Any]], fields: NumberFields) -> None:
-        data, self._spans = bytearray(), list[slice]()
+        data, self._spans, self.names = bytearray(), list[slice](), fields.names
         for type_name, msg in messages:
             encoded = bytes(jazzy().serialize_cdr(msg, type_name))
             self._spans.append(slice(len(data), len(data) + len(encoded)))

@@ -14,19 +14,7 @@ from pydantic_core import ErrorDetails
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError, listed
 from ..types import NUMBERED_SIDE, SENSORS, Stream, sensor_kind, stream_of
-from .topic_table import (
-    TYPES,
-    InputTopic,
-    Qos,
-    Sensor,
-    SensorPlace,
-    Topic,
-    Topics,
-    default_document,
-    load_topics,
-    used_inputs,
-    usual,
-)
+from .topic_table import InputTopic, Qos, Sensor, SensorPlace, Topic, Topics, default_document, load_topics, used_inputs, usual
 
 NO_LAG = frozenset({Stream.FORCES, Stream.PRESSURES, Stream.MOMENTS})  # zeros that change with the posture hide a lag
 
@@ -109,7 +97,6 @@ def _merged(base: Any, own: Any) -> Any:
 def _role_faults(values: dict[str, Any], usual_values: dict[str, Any]) -> list[Fault]:
     """Return faults for unknown roles and for types other than those of their roles. Remove unknown roles from `values`."""
     faults: list[Fault] = []
-    types = {role.value: type_name for role, type_name in TYPES.items()}
     for side in ("inputs", "outputs"):
         if not isinstance(values[side], dict):
             continue
@@ -117,8 +104,8 @@ def _role_faults(values: dict[str, Any], usual_values: dict[str, Any]) -> list[F
             near = get_close_matches(str(role), usual_values[side], n=1, cutoff=0.0)
             faults.append(Fault(f"{side}.{role}", values[side].pop(role), "unknown topic", f"The nearest is `{near[0]}`."))
         for role, topic in values[side].items():
-            if isinstance(topic, dict) and topic["type"] != types[role]:
-                bound = f"only {types[role]} is read or filled there"
+            if isinstance(topic, dict) and topic["type"] != (usual_type := usual_values[side][role]["type"]):
+                bound = f"only {usual_type} is read or filled there"
                 faults.append(Fault(f"{side}.{role}.type", topic["type"], bound, "Leave the key out."))
     return faults
 

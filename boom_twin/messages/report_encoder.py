@@ -19,9 +19,9 @@ from ..scene.schema import Scene
 from ..twin.blocks import STREAMS, EstimateBlock, Integers, PredictionBlock, ReportBlock, ResidualBlock
 from ..types import Alarm, Array, Change, Health, Report, channels_of
 from .cdr_encoder import Bytes, EncodedBlock, EncodedBlockBuilder, NumberFields, Template, stamped
-from .numeric_outputs import ESTIMATED, JOINTS, PREDICTED, Chain, number_rows, put_vector, selection
+from .numeric_outputs import ESTIMATED, JOINTS, PREDICTED, Chain, Placer, number_rows, selection
 from .sample_decoder import stamp_of
-from .topic_table import FRAME, TIP_JOINTS, TYPES, Output
+from .topic_table import FRAME, TIP_JOINTS, Output, type_of
 from .type_store import fill_header, fill_xz, jazzy, new_message
 
 POINT = struct.Struct("<3d")
@@ -75,7 +75,7 @@ class ShapeMarkers:
 
     def _new_template(self, points: int, cylinders: int) -> Template:
         """Return the template of a message whose lines have `points` points and whose trace has one point."""
-        msg, fields = new_message(TYPES[Output.SHAPE]), NumberFields()
+        msg, fields = new_message(type_of(Output.SHAPE)), NumberFields()
         msg.markers = [
             self._line("boom", 0, 0.12, BOOM, fields, points),
             self._line("boom_exaggerated", 0, 0.06, LARGE, fields, points),
@@ -84,7 +84,7 @@ class ShapeMarkers:
             *(self._line("cylinders", i + 1, 0.09, None, fields, 2) for i in range(cylinders)),
             self._line("tip_trace", 0, 0.03, TIP, fields, 1),
         ]
-        return Template([(TYPES[Output.SHAPE], msg)], fields)
+        return Template([(type_of(Output.SHAPE), msg)], fields)
 
     def _with_trace(self, data: bytes) -> bytes:
         """Return the message with all points of the trace. A point has 24 bytes, so the alignment after them is unchanged."""
@@ -141,10 +141,10 @@ OK, WARN, ERROR = range(3)
 
 def encode_health(health: Health, frame: str = FRAME) -> bytes:
     """Return `health` as a diagnostic_msgs/DiagnosticArray in CDR, with its stamp; see ``topics.yaml`` for its values."""
-    msg = new_message(TYPES[Output.HEALTH])
+    msg = new_message(type_of(Output.HEALTH))
     fill_header(msg.header, health.stamp, frame)
     msg.status = [_status(alarm) for alarm in health.alarms]
-    return bytes(jazzy().serialize_cdr(msg, TYPES[Output.HEALTH]))
+    return bytes(jazzy().serialize_cdr(msg, type_of(Output.HEALTH)))
 
 
 def decode_health(msg: Any) -> tuple[Alarm, ...]:
@@ -175,10 +175,10 @@ FROM_REST, NEW = "from_rest", 2.0
 def encode_changes(change: Change, frame: str = FRAME) -> bytes:
     """Return the message of a change in CDR."""
     values = {FROM_REST: NEW if change.is_new else float(change.from_rest), **change.settings, **change.zeros}
-    msg = new_message(TYPES[Output.CHANGES])
+    msg = new_message(type_of(Output.CHANGES))
     fill_header(msg.header, change.stamp, frame)
     msg.name, msg.position = list(values), np.array(list(values.values()), dtype=float)
-    return bytes(jazzy().serialize_cdr(msg, TYPES[Output.CHANGES]))
+    return bytes(jazzy().serialize_cdr(msg, type_of(Output.CHANGES)))
 
 
 def decode_changes(msg: Any) -> Change:
@@ -195,7 +195,6 @@ def decode_changes(msg: Any) -> Change:
 
 
 Messages = list[tuple[Output, bytes]]
-Placer = Callable[[Any, NumberFields], None]
 
 
 class ReportEncoder:
@@ -208,22 +207,18 @@ class ReportEncoder:
         count, self._frame = len(scene.joints), frame
         self._passive = PassiveJoints(scene)
         self._chain = Chain(np.array(scene.base.pivot), np.array([section.length for section in scene.sections]))
-        own = [f"{kind}_{number}" for kind in ("joint", "stroke", "force") for number in range(1, count + 1)]
-        names = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in range(1, count + 1)]
-        joints = (Output.JOINT_STATES, _joint_states([*names, *TIP_JOINTS], count), (*own, *TIP_JOINTS))
-        rows = [*PREDICTED, joints, *ESTIMATED]
-        self._predicted, self._outputs = len(PREDICTED) + 1, [output for output, _, _ in rows]
-        self._numeric = self._template([(output, put) for output, put, _ in rows])
-        self._chosen, self._signs = selection([name for _, _, names in rows for name in names], count)
-        self._joints, _ = selection(joints[2], count)
-        all_joints = _joint_states([*names, *TIP_JOINTS, *self._passive.names], count)
-        self._shaped_joints = self._template([(Output.JOINT_STATES, all_joints)])
-        self._uncertainty = self._template([(Output.TIP_UNCERTAINTY, put_vector)])
+        rows = [*PREDICTED, (Output.JOINT_STATES, _joint_states(count)), *ESTIMATED]
+        self._predicted, self._outputs = len(PREDICTED) + 1, [output for output, _ in rows]
+        self._numeric = self._template(rows)
+        self._chosen, self._signs = selection(self._numeric.names, count)
+        self._shaped_joints = self._template([(Output.JOINT_STATES, _joint_states(count, self._passive.names))])
+        self._joints, _ = selection(self._shaped_joints.names, count)
+        self._uncertainty = self._template([(Output.TIP_UNCERTAINTY, lambda msg, at: fill_xz(msg.vector, at.row(2)))])
         self._channels = channels_of(count)
         self._residuals: dict[tuple[str, ...], Template] = {}
         self._markers = ShapeMarkers(settings.exaggeration, settings.force_scale, frame)
         for output in Output:  # their encoders are compiled here, not when the first message waits
-            jazzy().get_msgdef(TYPES[output])
+            jazzy().get_msgdef(type_of(output))
 
     def fill(self, report: Report, is_wanted: Callable[[Output], bool] = lambda output: True) -> Messages:
         """Return the messages of one report.
@@ -328,20 +323,23 @@ class ReportEncoder:
     def _template(self, outputs: Sequence[tuple[Output, Placer]]) -> Template:
         messages, fields = list[tuple[str, Any]](), NumberFields()
         for output, put in outputs:
-            msg = new_message(TYPES[output])
+            msg = new_message(type_of(output))
             stamped(msg.header, self._frame)
             put(msg, fields)
-            messages.append((TYPES[output], msg))
+            messages.append((type_of(output), msg))
         return Template(messages, fields)
 
 
-def _joint_states(names: list[str], count: int) -> Placer:
+def _joint_states(count: int, passive: Sequence[str] = ()) -> Placer:
     """Return the placer of joints, cylinders, joints of the tip and passive joints. Only cylinders have an effort."""
-    others = len(names) - 2 * count
+
+    def numbered(*kinds: str) -> list[str]:
+        return [f"{kind}_{number}" for kind in kinds for number in range(1, count + 1)]
 
     def put(msg: Any, fields: NumberFields) -> None:
-        own, efforts, more = (fields.row(number) for number in (2 * count, count, others))
-        msg.name, msg.position = names, np.array(own + more)
-        msg.effort = np.array([nan] * count + efforts + [nan] * others)
+        msg.name = [*numbered("joint", "cylinder"), *TIP_JOINTS, *passive]
+        own, efforts = fields.named(*numbered("joint", "stroke")), fields.named(*numbered("force"))
+        others = fields.named(*TIP_JOINTS) + fields.row(len(passive))
+        msg.position, msg.effort = np.array(own + others), np.array([nan] * count + efforts + [nan] * len(others))
 
     return put

@@ -101,27 +101,6 @@ class Output(StrEnum):
     DIAGNOSTICS = "diagnostics"
 
 
-TYPES: dict[Stream | Output, str] = {
-    **{stream: kind.message for stream, kind in SENSORS.items()},
-    Output.TIP_DISPLACEMENT: "geometry_msgs/msg/Vector3Stamped",
-    Output.TIP_POSITION: "geometry_msgs/msg/PointStamped",
-    Output.TIP_ACCELERATION: "geometry_msgs/msg/AccelStamped",
-    Output.JOINT_STATES: "sensor_msgs/msg/JointState",
-    Output.RESIDUALS: "sensor_msgs/msg/JointState",
-    Output.SHAPE: "visualization_msgs/msg/MarkerArray",
-    Output.CHANGES: "sensor_msgs/msg/JointState",
-    Output.HEALTH: "diagnostic_msgs/msg/DiagnosticArray",
-    Output.TIP_UNCERTAINTY: "geometry_msgs/msg/Vector3Stamped",
-    Output.ESTIMATE_POSE: "geometry_msgs/msg/PoseWithCovarianceStamped",
-    Output.ESTIMATE_TWIST: "geometry_msgs/msg/TwistWithCovarianceStamped",
-    Output.ESTIMATE_ACCELERATION: "geometry_msgs/msg/AccelWithCovarianceStamped",
-    Output.ESTIMATE_LOAD: "geometry_msgs/msg/WrenchStamped",
-    Output.ESTIMATE_MODES: "sensor_msgs/msg/JointState",
-    Output.DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
-}
-"""The one message type that the program reads or fills for each role."""
-
-
 class _Entry(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -326,6 +305,11 @@ class Topics(_Entry):
 def load_topics() -> Topics:
     """Return the topics of the package with default sensors; the file is read once."""
     return Topics.model_validate({**default_document(), "inputs": used_inputs(default_document()["inputs"], {})})
+
+
+def type_of(output: Output) -> str:
+    """Return the one message type that the program fills for an output."""
+    return load_topics().outputs[output].type
 
 
 @cache

@@ -9,14 +9,7 @@ from typing import Any
 from ..bag.advice import refuse_conflicts
 from ..bag.reader import Session, read, scan
 from ..bag.session_file import WHOLE, TimeWindow
-from ..bag.session_model import (
-    SessionScene,
-    SessionStrokes,
-    mapping_of,
-    scene_of,
-    settings_of,
-    strokes_of,
-)  # fmt: skip
+from ..bag.session_model import SessionScene, SessionStrokes, mapping_of, scene_of, settings_of, strokes_of
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..health.wiring_monitor import SCENE
@@ -74,7 +67,7 @@ class ReplayInputs:
     def expected(self) -> int:
         """Approximate number of messages to read."""
         session = self.session
-        count = sum(topic.count for name in self.wanted if (topic := session.find(name)) is not None)
+        count = sum(map(session.count, self.wanted))
         return round(count * self.window.share((session.end - session.start) * NANO))
 
     @property
@@ -120,13 +113,10 @@ def replay_inputs(
     joints = kept.scene.joints
     mapped = mapping_of(session.path, Path(options.mapping) if options.mapping else None, len(joints), options.namespace)
     topics = mapped.topics.of_scene(joints)
-    if not topics.areas and (found := session.find(topics.inputs[Stream.PRESSURES].name)) is not None and found.count:
+    if not topics.areas and session.count(topics.inputs[Stream.PRESSURES].name):
         raise UsageError(f"{session.path}: {NO_AREAS}")
     drive = topics.stroke_reading.stream
-    topics_there = {name: session.find(name) for name in topics.heard}
-    wanted = [
-        name for name, topic in topics_there.items() if drive in topics.heard[name] or (topic is not None and topic.count)
-    ]
+    wanted = [name for name, streams in topics.heard.items() if drive in streams or session.count(name)]
     strokes = strokes_of(session.path, mapped)
     refuse_conflicts(session, topics, len(joints), kept.source)
     streams = tuple(

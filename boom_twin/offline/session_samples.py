@@ -20,8 +20,7 @@ from ..config.settings import Settings
 from ..messages.cdr_decoder import CdrDecoder, MessageBlock, stamp_in
 from ..messages.report_encoder import ReportEncoder, decode_changes
 from ..messages.sample_decoder import SampleDecoder
-from ..messages.topic_table import TYPES, Output, Topic, Topics
-from ..messages.type_store import decode
+from ..messages.topic_table import Output, Topic, Topics
 from ..scene.schema import Scene
 from ..twin.blocks import CODES, Integers, ReportBlock, SampleBlock, block_of, samples_in
 from ..types import SENSORS, Array, Change, Sample, Stream
@@ -66,8 +65,7 @@ def recorded_changes(session: Session, topics: Topics) -> Changes:
     Raise BagError if the session cannot be read, or holds what is no change.
     """
     topic = topics.outputs[Output.CHANGES]
-    info = session.find(topic.absolute)
-    if info is None or info.count == 0:
+    if not session.count(topic.absolute):
         return Changes([])
     return Changes((log, decode_changes(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
 
@@ -164,7 +162,7 @@ class SessionSamples:
 
 
 def decoder_of(streams: list[Stream]) -> CdrDecoder:
-    return CdrDecoder(TYPES[streams[0]], decode, SENSORS[streams[0]].field)
+    return CdrDecoder(SENSORS[streams[0]].message, field=SENSORS[streams[0]].field)
 
 
 ITEMS_AHEAD = 8  # blocks of samples, or of reports, that wait between two threads

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from fuzz.mcap_files import rewrite
-from mcap.writer import IndexType
 from recordings import FILE_NAME, Session, read, write_session
 
 NOTES = {"origin": "synthetic, made for a test"}
@@ -68,25 +67,3 @@ def rewritten(tmp_path: Path) -> Callable[..., Path]:
         return rewrite(bag / FILE_NAME, tmp_path / name, **options)
 
     return other
-
-
-UNINDEXED = {
-    "no message index": {"index_types": IndexType.CHUNK},
-    "no index": {"index_types": IndexType.NONE},
-    "no summary": {
-        "index_types": IndexType.NONE,
-        "use_statistics": False,
-        "use_summary_offsets": False,
-        "repeat_channels": False,
-        "repeat_schemas": False,
-    },
-    "no repeated channels": {"repeat_channels": False, "repeat_schemas": False},
-    "no chunks": {"use_chunking": False, "enable_data_crcs": True},
-    "no checksums": {"enable_crcs": False},
-}
-
-
-@pytest.fixture(params=UNINDEXED, ids=lambda name: name.replace(" ", "-"))
-def lacking(request: pytest.FixtureRequest) -> dict[str, Any]:
-    """Options of a writer that leaves something out."""
-    return UNINDEXED[request.param]

@@ -52,30 +52,21 @@ ROUND = [(10.0 + 0.1 * k, 0.1 * k) for k in range(100)]
 LOOP = [*ROUND, *((log + 10.0, stamp) for log, stamp in ROUND)]
 
 
-@pytest.mark.parametrize(
-    ("logged", "strokes", "expected"),
-    [
-        ([(10.01, 0.0), (13.0, 3.0)], ROUND, [(0.0, 10.0), (3.0, 13.0)]),
-        ([(10.0, 0.25)], ROUND, [(0.25, 10.3)]),
-        ([(10.3, 0.0)], ROUND[2:], [(0.0, 10.2)]),
-        ([(9.9, -90.0)], ROUND, [(-90.0, 10.0)]),
-        ([(10.3, -90.0)], ROUND, [(-90.0, 10.0)]),
-        ([(13.02, 3.0)], [*ROUND[:20], *LOOP[100:]], [(3.0, 20.0)]),
-        ([(23.0, 3.0)], LOOP, [(3.0, 23.0)]),
-        ([(20.0, 0.0)], LOOP, [(0.0, 20.0)]),
-    ],
-    ids=[
-        "plain",
-        "its stroke is lost",
-        "recorded from later on",
-        "latched",
-        "latched, late",
-        "in a pause of the recording",
-        "second round",
-        "jump back",
-    ],
-)
-def test_where_a_change_begins(logged: list, strokes: list, expected: list) -> None:
+BEGINNINGS: dict[str, tuple[list, list, list]] = {
+    "plain": ([(10.01, 0.0), (13.0, 3.0)], ROUND, [(0.0, 10.0), (3.0, 13.0)]),
+    "its stroke is lost": ([(10.0, 0.25)], ROUND, [(0.25, 10.3)]),
+    "recorded from later on": ([(10.3, 0.0)], ROUND[2:], [(0.0, 10.2)]),
+    "latched": ([(9.9, -90.0)], ROUND, [(-90.0, 10.0)]),
+    "latched, late": ([(10.3, -90.0)], ROUND, [(-90.0, 10.0)]),
+    "in a pause of the recording": ([(13.02, 3.0)], [*ROUND[:20], *LOOP[100:]], [(3.0, 20.0)]),
+    "second round": ([(23.0, 3.0)], LOOP, [(3.0, 23.0)]),
+    "jump back": ([(20.0, 0.0)], LOOP, [(0.0, 20.0)]),
+}
+
+
+@pytest.mark.parametrize("case", BEGINNINGS)
+def test_where_a_change_begins(case: str) -> None:
+    logged, strokes, expected = BEGINNINGS[case]
     assert begun(logged, strokes) == expected
 
 

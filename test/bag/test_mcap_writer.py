@@ -39,20 +39,20 @@ def block_of(messages: list[Message]) -> EncodedBlock:
     return EncodedBlock(np.array([time for _, time, _, _ in messages]), rows)
 
 
-def definition(flushed: set[int]) -> bytes:
-    """Of a message type; where the chunk is flushed in between, it is longer than that."""
-    return b"int32 value\n" * (200 if flushed else 40)
+def define(writer: Writer | McapWriter, flushed: set[int]) -> None:
+    """Write a note, types and topics. A definition is longer than a chunk where the chunk is flushed in between."""
+    writer.add_metadata("notes", {"origin": "synthetic", "": "ä"})
+    for name in ("pkg/msg/A", "pkg/msg/B"):
+        writer.register_schema(name, "ros2msg", b"int32 value\n" * (200 if flushed else 40))
+    for number in range(3):
+        writer.register_channel(f"/{number}", "cdr", 1 + number % 2, {"offered_qos_profiles": "- x"})
 
 
 def by_the_library(messages: list[Message], flushed: set[int]) -> bytes:
     with BytesIO() as file:
         writer = Writer(file, chunk_size=CHUNK)
         writer.start("ros2", "test")
-        writer.add_metadata("notes", {"origin": "synthetic", "": "ä"})
-        for name in ("pkg/msg/A", "pkg/msg/B"):
-            writer.register_schema(name, "ros2msg", definition(flushed))
-        for number in range(3):
-            writer.register_channel(f"/{number}", "cdr", 1 + number % 2, {"offered_qos_profiles": "- x"})
+        define(writer, flushed)
         for place, (channel, time, sequence, data) in enumerate(messages):
             if place in flushed:
                 writer.flush()
@@ -66,11 +66,7 @@ def by_the_package(messages: list[Message], flushed: set[int], size: int) -> byt
     """In blocks of so many, and one by one where that is 0."""
     file = BytesIO()
     writer = McapWriter(file, "ros2", "test", CHUNK)
-    writer.add_metadata("notes", {"origin": "synthetic", "": "ä"})
-    for name in ("pkg/msg/A", "pkg/msg/B"):
-        writer.register_schema(name, "ros2msg", definition(flushed))
-    for number in range(3):
-        writer.register_channel(f"/{number}", "cdr", 1 + number % 2, {"offered_qos_profiles": "- x"})
+    define(writer, flushed)
     ends = sorted({0, *flushed, len(messages), *(range(0, len(messages), size) if size else ())})
     for first, end in pairwise(ends):
         if first in flushed:

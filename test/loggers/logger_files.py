@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from datetime import datetime, timedelta
 from functools import cache
 from pathlib import Path
@@ -31,12 +30,10 @@ def german(stamp: int) -> str:
     return f"{local:%d.%m.%Y %H:%M:%S},{local.microsecond:06d}"
 
 
-def lines(
-    stamps: np.ndarray, values: np.ndarray, time: Callable[[int], str], number: str, separator: str, mark: str = ","
-) -> list[str]:
+def lines(stamps: np.ndarray, values: np.ndarray) -> list[str]:
     """Rows of text, an empty cell for NaN."""
-    cells = [["" if value != value else format(value, number).replace(".", mark) for value in row] for row in values.tolist()]
-    return [separator.join([time(stamp), *row]) for stamp, row in zip(stamps.tolist(), cells, strict=True)]
+    cells = [["" if value != value else f"{value:.9f}".replace(".", ",") for value in row] for row in values.tolist()]
+    return [";".join([german(stamp), *row]) for stamp, row in zip(stamps.tolist(), cells, strict=True)]
 
 
 def three_german_files(folder: Path, seconds: float = 20.0) -> tuple[list[Path], Readings]:
@@ -51,18 +48,10 @@ def three_german_files(folder: Path, seconds: float = 20.0) -> tuple[list[Path],
     (stamps, strokes), (angle_stamps, angles), (imu_stamps, imu) = found.values()
     head = "Zeit;" + ";".join(f"Zylinder {i} [mm]" for i in range(1, 5))
     extra = np.column_stack([1e3 * strokes, np.linspace(20.0, 30.0, len(strokes))])
-    zylinder = [
-        "Messung Mast 4",
-        "Bediener: Müller",
-        "",
-        head + ";Öltemperatur [°C]",
-        *lines(stamps, extra, german, ".9f", ";"),
-    ]
-    winkel = [
-        "Zeit;" + ";".join(f"Gelenkwinkel {i} (°)" for i in range(1, 5)),
-        *lines(angle_stamps, np.degrees(angles), german, ".9f", ";"),
-    ]
-    beschl = ["Zeit;Beschl. X in g;Beschl. Z in g", *lines(imu_stamps, imu / G, german, ".9f", ";")]
+    zylinder = ["Messung Mast 4", "Bediener: Müller", "", head + ";Öltemperatur [°C]", *lines(stamps, extra)]
+    names = "Zeit;" + ";".join(f"Gelenkwinkel {i} (°)" for i in range(1, 5))
+    winkel = [names, *lines(angle_stamps, np.degrees(angles))]
+    beschl = ["Zeit;Beschl. X in g;Beschl. Z in g", *lines(imu_stamps, imu / G)]
     files = [folder / "zylinder.csv", folder / "winkel.csv", folder / "beschleunigung.csv"]
     for file, text, encoding in zip(files, (zylinder, winkel, beschl), ("cp1252", "utf-8-sig", "utf-16"), strict=True):
         file.write_bytes("\r\n".join([*text, ""]).encode(encoding))

@@ -142,10 +142,7 @@ def test_a_table_of_simulate_is_imported_by_its_lengths_and_strokes_alone_are_no
 
 
 def test_signals_of_a_bus_come_row_by_row_and_are_one_sample_a_cycle(tmp_path: Path) -> None:
-    head = [
-        "// export of a CAN trace",
-        "Time[s]," + ",".join(f"Boom::CylPos_{i}[mm]" for i in range(1, 5)) + ",Boom::OilTemp[degC]",
-    ]
+    names = ",".join(f"Boom::CylPos_{i}[mm]" for i in range(1, 5))
     rows = [
         f"{0.01 * cycle + 0.001 * i:.6f},"
         + ",".join(f"{value:.3f}" if i == k else "" for k, value in enumerate(STROKES))
@@ -153,7 +150,7 @@ def test_signals_of_a_bus_come_row_by_row_and_are_one_sample_a_cycle(tmp_path: P
         for cycle in range(ROWS)
         for i in range(4)
     ]
-    (tmp_path / "can.csv").write_text("\n".join([*head, *rows]))
+    (tmp_path / "can.csv").write_text("\n".join(["// export of a CAN trace", f"Time[s],{names},Boom::OilTemp[degC]", *rows]))
     assert main(["import", str(tmp_path / "can.csv"), "--out", str(tmp_path / "s")]) == 0
     assert [list(values) for _, values in messages(tmp_path / "s")[:4]] == [[f"cylinder_{i}"] for i in range(1, 5)]
     done = replay(tmp_path / "s", None, tmp_path / "out", health=False, with_bag=False)
@@ -161,12 +158,8 @@ def test_signals_of_a_bus_come_row_by_row_and_are_one_sample_a_cycle(tmp_path: P
 
 
 def test_a_proposal_is_edited_and_given_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = table(
-        ["t;Lift;" + ";".join(NAMES[1:]) + ";Neigung 2 (deg);Kraft"],
-        lambda row: f"{0.02 * row:.2f}",
-        numbers(",", 4),
-        end=";41,5;7,0",
-    )
+    head = "t;Lift;" + ";".join(NAMES[1:]) + ";Neigung 2 (deg);Kraft"
+    text = table([head], lambda row: f"{0.02 * row:.2f}", numbers(",", 4), end=";41,5;7,0")
     (tmp_path / "log.csv").write_text(text)
     arguments = ["import", str(tmp_path / "log.csv")]
     assert main([*arguments, "--out", str(tmp_path / "s")]) == 1
@@ -180,14 +173,7 @@ def test_a_proposal_is_edited_and_given_back(tmp_path: Path, capsys: pytest.Capt
     (tmp_path / "rig.yaml").write_text(
         "sensors: {joint_2: {unit: deg, absolute: root}, cylinder_1: {name: lift, unit: mm, zero: 12.5}}"
     )
-    options = [
-        "--columns",
-        str(tmp_path / "columns.yaml"),
-        "--mapping",
-        str(tmp_path / "rig.yaml"),
-        "--out",
-        str(tmp_path / "s"),
-    ]
+    options = [f"--columns={tmp_path / 'columns.yaml'}", f"--mapping={tmp_path / 'rig.yaml'}", f"--out={tmp_path / 's'}"]
     assert main([*arguments, *options]) == 0
     assert messages(tmp_path / "s")[0][1] == pytest.approx(
         {"lift": 628.8, "cylinder_2": 0.16806, "cylinder_3": 0.236075, "cylinder_4": 0.18708}
@@ -198,16 +184,7 @@ def test_a_proposal_is_edited_and_given_back(tmp_path: Path, capsys: pytest.Capt
 
 
 def test_rows_that_repeat_or_step_back_keep_their_order_and_stamps(tmp_path: Path) -> None:
-    times = [
-        0.00,
-        0.01,
-        0.02,
-        0.02,
-        0.01,
-        0.03,
-        *(0.03 + 0.01 * k for k in range(1, 20)),
-        *(0.05 + 0.01 * k for k in range(-500, -480)),
-    ]
+    times = [0.00, 0.01, 0.02, 0.02, 0.01, 0.03, *(0.01 * k for k in range(4, 23)), *(0.01 * k for k in range(-495, -475))]
     rows = iter(times)
     text = table(["Zeit [s];" + ";".join(NAMES)], lambda _: f"{next(rows):.2f}", numbers(",", 4), rows=len(times))
     (tmp_path / "log.csv").write_text(text)

@@ -42,15 +42,9 @@ def test_the_example_of_a_live_source_predicts_records_and_replays(
                 ends = "xz" if name == "tip_imu" else range(1, 5)
                 packet |= {channel.format(end): value for end, value in zip(ends, found[name][1][row], strict=True)}
             rig.send(json.dumps(packet).encode())
-        for odd in (
-            b"no JSON",
-            b"\xff",
-            b"[1]",
-            b'{"stamp_ns": 1, "zylinder_1": 0.6}',
-            b'{"cylinder_1": 0.6}',
-            b'{"end": true}',
-        ):
+        for odd in (b"no JSON", b"\xff", b"[1]", b'{"stamp_ns": 1, "zylinder_1": 0.6}', b'{"cylinder_1": 0.6}'):
             rig.send(odd)
+        rig.send(b'{"end": true}')
         last = example.run(source, load_scene(), tmp_path / "live", page_port=0)
     told = capsys.readouterr().out
     assert "open http://127.0.0.1:" in told and told.count("left out: ") == 5 and "Did you mean cylinder_1?" in told

@@ -116,10 +116,7 @@ def test_their_noise_is_that_of_the_forces(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (
-            "inputs: {cylinder_pressures: {required: true}}",
-            "oil: {bore, rod, ..}` to each cylinder of the scene, or bore and rod",
-        ),
+        ("inputs: {cylinder_pressures: {required: true}}", "oil: {bore, rod, ..}` to each cylinder of the scene, or bore"),
         ("inputs: {cylinder_pressures: {bore: [0.1], rod: [0.05]}}", "1 and 1 entries, the scene has 4 cylinders"),
         (
             "inputs: {cylinder_pressures: {bore: [0.1, 0.1, 0.1, 0.1], rod: [0.05, 0.1, 0.05, 0.05]}}",
