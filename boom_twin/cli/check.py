@@ -107,11 +107,11 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "unknowns": account.unknowns,
         "stroke_low_m": [joint.stroke_low for joint in joints],
         "stroke_high_m": [joint.stroke_high for joint in joints],
-        "lever_least_m": [joint.linkage.lever[0] for joint in joints],
-        "lever_greatest_m": [joint.linkage.lever[1] for joint in joints],
-        "transmission_least_deg": [joint.linkage.transmission_deg for joint in joints],
+        "lever_least_m": [joint.lever[0] for joint in joints],
+        "lever_greatest_m": [joint.lever[1] for joint in joints],
+        "transmission_least_deg": [joint.transmission_deg for joint in joints],
         "oil_stiffness_N_m": [list(joint.k_over_stroke) for joint in joints],
-        "left_out": [f"{item.key}: {item.meaning}" for item in account.left_out],
+        "left_out": [f"{key}: {meaning}" for key, meaning in account.left_out.items()],
         "warnings": [str(oddity) for oddity in oddities if not oddity.is_note],
         "notes": [str(oddity) for oddity in oddities if oddity.is_note],
     }
@@ -135,8 +135,8 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
         lines += ["", "Stiffness of the oil over the stroke, kN/mm", *_over_stroke(account)]
     if scene.clearance is not None and account.pins:
         lines += ["", _clearance_title(scene.clearance), *_pins(account)]
-    left_out = [[item.key, item.meaning] for item in account.left_out]
-    lines += ["", "Left out of the model (absent from the scene, zero or false)", *_table(left_out, left=2)]
+    left_out = _table([*map(list, account.left_out.items())], left=2)
+    lines += ["", "Left out of the model (absent from the scene, zero or false)", *left_out]
     lines += ["", f"Unknowns per step: {account.unknowns}", *_unknowns(account)]
     warnings = [oddity for oddity in oddities if not oddity.is_note]
     lines += ["", *(f"Note: {oddity}" for oddity in oddities if oddity.is_note)]
@@ -204,10 +204,8 @@ def _oil(joint: JointAccount) -> str:
 def _linkages(account: Account) -> list[str]:
     rows = [["", "lever m", "links meet at"]]
     for joint in account.joints:
-        own = joint.linkage
-        links = "-" if own.transmission_deg is None else f"{own.transmission_deg:.0f} deg at least"
-        lever = f"{own.lever[0]:.3f} to {own.lever[1]:.3f}"
-        rows.append([f"joint {joint.number}", lever, links])
+        links = "-" if joint.transmission_deg is None else f"{joint.transmission_deg:.0f} deg at least"
+        rows.append([f"joint {joint.number}", f"{joint.lever[0]:.3f} to {joint.lever[1]:.3f}", links])
     return _table(rows, left=3)
 
 
