@@ -16,14 +16,14 @@ from ..messages.topic_table import Topics, load_topics
 from ..twin.sample_check import merged
 from ..twin.twin import Twin
 from ..types import Report, Sample
-from . import PORT
+from . import ACTS, PORT
 from .access_control import AccessControl
 from .data.bag_feed import TwinView
 from .data.feed import Feed
 from .data.status import Severity, text
 from .data.store import Store
 from .server import Server, serving
-from .viewer import ACTS, ViewerActions
+from .viewer import ViewerActions
 
 
 class SourceFeed(Feed):
