@@ -45,14 +45,7 @@ class SceneWarning(UserWarning):
     """Warning of an irregularity in a scene that can be used; the text has the form of a `Fault`."""
 
 
-class _Absent:
-    """Value of a fault at a key that is not there."""
-
-    def __repr__(self) -> str:
-        return "absent"
-
-
-ABSENT = _Absent()
+ABSENT = object()  # value of a fault at a key that is not there
 FaultKind = Literal["fault", "warning", "note"]
 
 
