@@ -66,11 +66,6 @@ class Fault:
         stop = "" if self.bound.endswith("?") else "."
         return printable(f"{where} {state}: {self.bound}{stop} {self.remedy}")
 
-    @property
-    def is_note(self) -> bool:
-        """Return True for a note."""
-        return self.kind == "note"
-
 
 def _shortened(value: Any, width: int = 60) -> str:
     """Return the text of a value in the spelling of the file, cut in the middle where it is long."""

@@ -60,12 +60,13 @@ def run(args: Namespace) -> int:
         from ..plots.boom import joint_ranges_picture
 
         drawn = [f"Written: {joint_ranges_picture(args.picture, scene, Path(name).name)}"]
-    if args.strict and any(not oddity.is_note for oddity in oddities):
+    warnings, notes = ([each for each in oddities if (each.kind == "note") is is_note] for is_note in (False, True))
+    if args.strict and warnings:
         for line in drawn:  # the picture shows what the warnings are about
             tell(line)
-        raise SceneError(name, tuple(oddity for oddity in oddities if not oddity.is_note))
+        raise SceneError(name, tuple(warnings))
     account = explain(scene)
-    values, lines = summary(name, account, oddities), report(name, scene, account, oddities)
+    values, lines = summary(name, account, warnings, notes), report(name, scene, account, warnings, notes)
     if scene.clearance is not None:
         law = scene.clearance.contact
         values |= {"restitution": law.restitution, "restitution_given": law.given_restitution}
@@ -84,7 +85,7 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str, Any]:
+def summary(name: str, account: Account, warnings: Sequence[Fault], notes: Sequence[Fault]) -> dict[str, Any]:
     """Return the description of the scene as one flat object."""
     sections, joints, base = account.sections, account.joints, account.scene.base.stiffness
     return {
@@ -112,12 +113,12 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "transmission_least_deg": [joint.transmission_deg for joint in joints],
         "oil_stiffness_N_m": [list(joint.k_over_stroke) for joint in joints],
         "left_out": [f"{key}: {meaning}" for key, meaning in account.left_out.items()],
-        "warnings": [str(oddity) for oddity in oddities if not oddity.is_note],
-        "notes": [str(oddity) for oddity in oddities if oddity.is_note],
+        "warnings": [*map(str, warnings)],
+        "notes": [*map(str, notes)],
     }
 
 
-def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault]) -> list[str]:
+def report(name: str, scene: Scene, account: Account, warnings: Sequence[Fault], notes: Sequence[Fault]) -> list[str]:
     """Return lines of text for a reader."""
     kinds = " + ".join(joint.kind for joint in scene.joints)
     count = len(account.sections)
@@ -138,8 +139,7 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     left_out = _table([*map(list, account.left_out.items())], left=2)
     lines += ["", "Left out of the model (absent from the scene, zero or false)", *left_out]
     lines += ["", f"Unknowns per step: {account.unknowns}", *_unknowns(account)]
-    warnings = [oddity for oddity in oddities if not oddity.is_note]
-    lines += ["", *(f"Note: {oddity}" for oddity in oddities if oddity.is_note)]
+    lines += ["", *(f"Note: {note}" for note in notes)]
     lines += [f"Warnings: {len(warnings) or 'none'}", *(f"  {warning}" for warning in warnings)]
     return lines
 

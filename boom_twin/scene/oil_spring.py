@@ -42,8 +42,3 @@ def stiffness(cylinder: Cylinder, stroke: float) -> float:
 def middle_stiffness(cylinder: Cylinder) -> float:
     """Return k (N/m) in the middle of the stroke."""
     return stiffness(cylinder, 0.5 * cylinder.max_stroke)
-
-
-def stiffness_over_stroke(cylinder: Cylinder) -> tuple[float, ...]:
-    """Return k (N/m) at each of `STATIONS`."""
-    return tuple(stiffness(cylinder, share * cylinder.max_stroke) for share in STATIONS)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .kinematics import RANGE_SAMPLES, joint_curve, linkage, stroke_range
-from .oil_spring import stiffness_over_stroke
+from .oil_spring import STATIONS, stiffness
 from .schema import IDEAL_BELOW, Joint, Pin, Scene, Section
 from .segmentation import Split, flexible_parts, splits
 
@@ -186,9 +186,9 @@ def _section(scene: Scene, i: int) -> SectionAccount:
 
 
 def _joint(scene: Scene, i: int) -> JointAccount:
-    joint = scene.joints[i]
+    joint, cylinder = scene.joints[i], scene.joints[i].cylinder
     low, high = stroke_range(scene, i, RANGE_SAMPLES)
-    oil = () if joint.cylinder.oil is None else stiffness_over_stroke(joint.cylinder)
+    oil = () if cylinder.oil is None else tuple(stiffness(cylinder, share * cylinder.max_stroke) for share in STATIONS)
     _, levers, between = joint_curve(linkage(scene, i), np.radians(np.linspace(*joint.range_deg, RANGE_SAMPLES)))
     lever = float(np.nanmin(levers)), float(np.nanmax(levers))
     return JointAccount(i + 1, joint, low, high, oil, lever, float(np.nanmin(between)) if i else None)
