@@ -135,7 +135,8 @@ def report(name: str, scene: Scene, account: Account, warnings: Sequence[Fault],
     if any(joint.k_over_stroke for joint in account.joints):
         lines += ["", "Stiffness of the oil over the stroke, kN/mm", *_over_stroke(account)]
     if scene.clearance is not None and account.pins:
-        lines += ["", _clearance_title(scene.clearance), *_pins(account)]
+        pins = [[pin.at, f"{1e3 * pin.pin_radius:g}", f"{1e3 * pin.radial_clearance:g}"] for pin in account.pins]
+        lines += ["", _clearance_title(scene.clearance), *_table([["", "pin radius mm", "radial clearance mm"], *pins])]
     left_out = _table([*map(list, account.left_out.items())], left=2)
     lines += ["", "Left out of the model (absent from the scene, zero or false)", *left_out]
     lines += ["", f"Unknowns per step: {account.unknowns}", *_unknowns(account)]
@@ -223,12 +224,6 @@ def _clearance_title(clearance: Clearance) -> str:
     words = f"{law.law} contact, {given}, friction {law.friction:g}"
     linear = ", linearised at the preload" if clearance.treatment == "spring-damper" else ""
     return f"Pins with clearance ({words}{linear})"
-
-
-def _pins(account: Account) -> list[str]:
-    rows = [["", "pin radius mm", "radial clearance mm"]]
-    rows += [[pin.at, f"{1e3 * pin.pin_radius:g}", f"{1e3 * pin.radial_clearance:g}"] for pin in account.pins]
-    return _table(rows)
 
 
 def _unknowns(account: Account) -> list[str]:

@@ -1,4 +1,4 @@
-"""What `simulate` says of a drive that is likely meant otherwise, before it simulates it."""
+"""What `simulate` reads, writes and says: drives likely meant otherwise, lengths, worn pins."""
 
 from __future__ import annotations
 
@@ -45,6 +45,23 @@ def test_a_drive_likely_meant_otherwise_is_told_and_followed(
     given = ["--drive", drive, "--out", str(tmp_path / "out.csv"), "--no-error-estimate", "--dt", "0.01"]
     assert main(["simulate", *given]) == 0
     assert (f"warning: {drive}: {told}" if told else "") in (err := capsys.readouterr().err) and (told or "warning" not in err)
+
+
+def test_lost_contacts_of_worn_pins_are_told_and_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scene", "--clearance"]) == 0
+    scene, out = tmp_path / "play.yaml", tmp_path / "out.csv"
+    scene.write_text(capsys.readouterr().out)
+    drive = written(
+        tmp_path / "drive.csv", np.linspace(0.0, 0.05, 6), np.tile(strokes_of_posture(load_scene(), "arch"), (6, 1))
+    )
+    assert main(["simulate", str(scene), "--posture", "arch", "--drive", drive, "--out", str(out)]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[4:] == [*(f"cylinder_{i}.rod: contact lost 0 times" for i in range(1, 5)), str(out)]
+    found = columns(out)
+    names = [f"cylinder_{i}_rod_{what}" for i in range(1, 5) for what in ("dx_m", "dy_m", "force_N", "contact")]
+    assert [*found][-20:] == [*names, *(f"length_{i}_m" for i in range(1, 5))] and len(found["t_s"]) == 6
+    assert found["cylinder_1_rod_contact"][-1] == 1.0
+    assert np.hypot(found["cylinder_1_rod_dx_m"], found["cylinder_1_rod_dy_m"])[-1] > 1e-4
 
 
 def columns(path: Path) -> dict[str, np.ndarray]:
