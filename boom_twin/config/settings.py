@@ -163,8 +163,7 @@ def load_thresholds(path: Path, namespace: str = "") -> Thresholds:
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
 NODE_ONLY = ("scene", "mapping", "health", "causes", "frame_prefix", "hardware_id", "autostart", "monitor")
-STROKE_RATE = 0.5
-"""Upper bound of a cylinder's speed, m/s."""
+STROKE_RATE = 0.5  # m/s, upper bound of a cylinder's speed
 
 
 class Settings(_Table):

@@ -242,10 +242,8 @@ class JointPins:
 class Skeleton:
     """An undeformed boom of n sections."""
 
-    headings: Array
-    """Orientation of every section, rad, shape (n,)."""
-    pivots: Array
-    """Inboard pivots, then the tip, m, shape (n + 1, 2)."""
+    headings: Array  # orientation of every section, rad, shape (n,)
+    pivots: Array  # inboard pivots, then the tip, m, shape (n + 1, 2)
     joints: tuple[JointPins, ...]
 
     def point(self, section: int, x: float) -> Array:

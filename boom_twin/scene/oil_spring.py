@@ -16,8 +16,7 @@ import numpy as np
 from ..kernels.elements.cylinder import OIL, oil_compliance
 from .schema import Cylinder
 
-STATIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Shares of the full stroke at which k is told."""
+STATIONS = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of the full stroke at which k is told
 
 
 def oil_record(cylinder: Cylinder) -> np.record:

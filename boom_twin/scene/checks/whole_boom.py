@@ -146,14 +146,10 @@ CELLS = 12  # of a beam
 class StraightBoom:
     """A stretched-out boom of n sections with k modes."""
 
-    frequencies: Array
-    """Natural frequencies, Hz, ascending, at most n + 2 of them, shape (k,)."""
-    levers: Array
-    """Change of stroke by angle, m/rad, shape (n,)."""
-    moments: Array
-    """Moments about the pivots of the weight of all that lies outboard, N m, shape (n,)."""
-    mass: float
-    """Mass of all that moves, kg."""
+    frequencies: Array  # natural frequencies, Hz, ascending, at most n + 2 of them, shape (k,)
+    levers: Array  # change of stroke by angle, m/rad, shape (n,)
+    moments: Array  # about the pivots, of the weight of all that lies outboard, N m, shape (n,)
+    mass: float  # of all that moves, kg
 
 
 @np.errstate(all="ignore")  # of absurd values
