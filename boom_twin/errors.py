@@ -45,14 +45,7 @@ class SceneWarning(UserWarning):
     """Warning of an irregularity in a scene that can be used; the text has the form of a `Fault`."""
 
 
-class _Absent:
-    """Value of a fault at a key that is not there."""
-
-    def __repr__(self) -> str:
-        return "absent"
-
-
-ABSENT = _Absent()
+ABSENT = object()  # value of a fault at a key that is not there
 FaultKind = Literal["fault", "warning", "note"]
 
 
@@ -72,11 +65,6 @@ class Fault:
         state = "is absent" if self.value is ABSENT else f"= {_shortened(self.value)}"
         stop = "" if self.bound.endswith("?") else "."
         return printable(f"{where} {state}: {self.bound}{stop} {self.remedy}")
-
-    @property
-    def is_note(self) -> bool:
-        """Return True for a note."""
-        return self.kind == "note"
 
 
 def _shortened(value: Any, width: int = 60) -> str:

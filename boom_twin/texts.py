@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -89,14 +90,11 @@ SENTENCES = {
 }
 """Sentences by kind of alarm, some by kind of channel or parameter too. The last one is for unknown kinds."""
 
-_TRANSLATIONS: dict[str, list[str]] = {}
 
-
+@cache
 def translations() -> Mapping[str, list[str]]:
     """Return the texts in German and Chinese by their English text."""
-    if not _TRANSLATIONS:
-        _TRANSLATIONS.update(json.loads(FILE.read_text(encoding="utf-8")))
-    return _TRANSLATIONS
+    return dict(json.loads(FILE.read_text(encoding="utf-8")))
 
 
 def translated(english: str, language: str = "en") -> str:

@@ -2,6 +2,16 @@
 
 from __future__ import annotations
 
+import json
+from typing import Any
+
+import pytest
+
 from boom_twin.cli.main import main
 
-__all__ = ["main"]
+
+def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    """Return the object that a command prints with ``--json``."""
+    capsys.readouterr()
+    assert main([*arguments, "--json"]) == 0
+    return dict(json.loads(capsys.readouterr().out))

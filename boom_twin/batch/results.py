@@ -85,10 +85,20 @@ class RigSummary:
 
 def rigs_of(rows: Sequence[Row]) -> list[RigSummary]:
     """Return a summary of each rig with a finished session, sorted by name."""
+    return [_summary(rig, found) for rig, found in _by_rig(rows)]
+
+
+def _by_rig(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
+    """Return the finished sessions of each rig in the order of their begin, sorted by the rig's name."""
     rigs: dict[str, list[Row]] = {}
     for row in sorted((row for row in rows if row["status"] == OK), key=lambda row: int(row["first_stamp_ns"])):
         rigs.setdefault(row["rig"], []).append(row)
-    return [_summary(rig, found) for rig, found in sorted(rigs.items())]
+    return sorted(rigs.items())
+
+
+def _figures(rows: Sequence[Row], beginnings: tuple[str, ...]) -> list[str]:
+    """Return the names of the figures in these rows that begin so."""
+    return sorted({name for row in rows for name in row if name.startswith(beginnings) and not name.endswith("_sigma")})
 
 
 def as_dict(rig: RigSummary) -> dict[str, object]:
@@ -110,8 +120,7 @@ def as_dict(rig: RigSummary) -> dict[str, object]:
 def _summary(rig: str, rows: list[Row]) -> RigSummary:
     once = [*{row["file_sha256"]: row for row in reversed(rows)}.values()][::-1]
     causes = Counter(cause for row in once for cause in {alarm["cause"] for alarm in row["alarms"]} if cause)
-    names = sorted({name for row in once for name in row if name.startswith(DRIFTING) and not name.endswith("_sigma")})
-    drifts = [drift for name in names if (drift := drift_of(name, once)) is not None]
+    drifts = [drift for name in _figures(once, DRIFTING) if (drift := drift_of(name, once)) is not None]
     hours, alarmed = sum(row["duration_s"] for row in once) / HOUR, sum(bool(row["alarms"]) for row in once)
     return RigSummary(rig, len(once), len(rows) - len(once), hours, alarmed, dict(causes.most_common()), _life(once), drifts)
 
@@ -258,14 +267,8 @@ def _trends(rows: Sequence[Row], summaries: Sequence[RigSummary], folder: Path) 
     """Yield name, drifts and picture in `folder` of wear-related figures over time, for every rig with several sessions."""
     max_trends = 24
     by_name = {rig.rig: rig for rig in summaries}
-    rigs: dict[str, list[Row]] = {}
-    for row in rows:
-        if row["status"] == OK:
-            rigs.setdefault(row["rig"], []).append(row)
-    for number, (rig, found) in enumerate(sorted(rigs.items())):
-        found.sort(key=lambda row: int(row["first_stamp_ns"]))
-        names = sorted({name for row in found for name in row if name.startswith(TRENDS) and not name.endswith("_sigma")})
-        trends = [trend for name in names if len((trend := _trend(name, found)).values) > 1][:max_trends]
+    for number, (rig, found) in enumerate(_by_rig(rows)):
+        trends = [trend for name in _figures(found, TRENDS) if len((trend := _trend(name, found)).values) > 1][:max_trends]
         if trends:
             picture = folder / f"{number}.png"
             trends_picture(picture, rig, trends)
@@ -275,6 +278,6 @@ def _trends(rows: Sequence[Row], summaries: Sequence[RigSummary], folder: Path) 
 
 
 def _trend(name: str, rows: Sequence[Row]) -> Trend:
-    known = [row for row in rows if isinstance(row.get(name), float | int) and isfinite(row[name])]
+    known = [row for row in rows if _is_number(row.get(name))]
     values, sigmas = [row[name] for row in known], [row.get(f"{name}_sigma") or 0.0 for row in known]
     return Trend(_with_unit(name), [row["first_stamp_ns"] / SECOND for row in known], values, sigmas)

@@ -16,8 +16,6 @@ from .output import open_session_scene, open_session_settings, print_result, war
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
-    from ..calibration.run import Progress
-    from ..offline.progress import ProgressBar
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -52,7 +50,11 @@ def run(args: Namespace) -> int:
     choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
     began = time.perf_counter()
     with closing(ProgressLine(100, "%", "calibrate")) as bar:
-        found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, _moving(bar), window_of(args))
+
+        def show(share: float, what: str) -> None:
+            bar.update(100.0 * share - bar.done)
+
+        found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, show, window_of(args))
     wall = time.perf_counter() - began
     credit = f"{args.date or time.strftime('%Y-%m-%d')} by boom_twin {__version__}"
     refuse_overwriting(args.out, sources, args.force)  # again: somebody may have put something there meanwhile
@@ -80,15 +82,3 @@ def _scene(args: Namespace) -> SessionScene:
         if scene_of(Path(bag)).scene != found.scene:
             raise UsageError(f"{bag}: made with another scene than {args.bags[0]}. Give the one that is right by --scene.")
     return found
-
-
-def _moving(bar: ProgressBar) -> Progress:
-    """Return a function that moves a bar of 100 % to a share of the whole."""
-    done = 0.0
-
-    def progress(share: float, what: str) -> None:
-        nonlocal done
-        bar.update(100.0 * share - done)
-        done = 100.0 * share
-
-    return progress

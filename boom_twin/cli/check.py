@@ -60,12 +60,13 @@ def run(args: Namespace) -> int:
         from ..plots.boom import joint_ranges_picture
 
         drawn = [f"Written: {joint_ranges_picture(args.picture, scene, Path(name).name)}"]
-    if args.strict and any(not oddity.is_note for oddity in oddities):
+    warnings, notes = ([each for each in oddities if (each.kind == "note") is is_note] for is_note in (False, True))
+    if args.strict and warnings:
         for line in drawn:  # the picture shows what the warnings are about
             tell(line)
-        raise SceneError(name, tuple(oddity for oddity in oddities if not oddity.is_note))
+        raise SceneError(name, tuple(warnings))
     account = explain(scene)
-    values, lines = summary(name, account, oddities), report(name, scene, account, oddities)
+    values, lines = summary(name, account, warnings, notes), report(name, scene, account, warnings, notes)
     if scene.clearance is not None:
         law = scene.clearance.contact
         values |= {"restitution": law.restitution, "restitution_given": law.given_restitution}
@@ -84,7 +85,7 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str, Any]:
+def summary(name: str, account: Account, warnings: Sequence[Fault], notes: Sequence[Fault]) -> dict[str, Any]:
     """Return the description of the scene as one flat object."""
     sections, joints, base = account.sections, account.joints, account.scene.base.stiffness
     return {
@@ -107,17 +108,17 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "unknowns": account.unknowns,
         "stroke_low_m": [joint.stroke_low for joint in joints],
         "stroke_high_m": [joint.stroke_high for joint in joints],
-        "lever_least_m": [joint.linkage.lever[0] for joint in joints],
-        "lever_greatest_m": [joint.linkage.lever[1] for joint in joints],
-        "transmission_least_deg": [joint.linkage.transmission_deg for joint in joints],
+        "lever_least_m": [joint.lever[0] for joint in joints],
+        "lever_greatest_m": [joint.lever[1] for joint in joints],
+        "transmission_least_deg": [joint.transmission_deg for joint in joints],
         "oil_stiffness_N_m": [list(joint.k_over_stroke) for joint in joints],
-        "left_out": [f"{item.key}: {item.meaning}" for item in account.left_out],
-        "warnings": [str(oddity) for oddity in oddities if not oddity.is_note],
-        "notes": [str(oddity) for oddity in oddities if oddity.is_note],
+        "left_out": [f"{key}: {meaning}" for key, meaning in account.left_out.items()],
+        "warnings": [*map(str, warnings)],
+        "notes": [*map(str, notes)],
     }
 
 
-def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault]) -> list[str]:
+def report(name: str, scene: Scene, account: Account, warnings: Sequence[Fault], notes: Sequence[Fault]) -> list[str]:
     """Return lines of text for a reader."""
     kinds = " + ".join(joint.kind for joint in scene.joints)
     count = len(account.sections)
@@ -134,12 +135,12 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     if any(joint.k_over_stroke for joint in account.joints):
         lines += ["", "Stiffness of the oil over the stroke, kN/mm", *_over_stroke(account)]
     if scene.clearance is not None and account.pins:
-        lines += ["", _clearance_title(scene.clearance), *_pins(account)]
-    left_out = [[item.key, item.meaning] for item in account.left_out]
-    lines += ["", "Left out of the model (absent from the scene, zero or false)", *_table(left_out, left=2)]
+        pins = [[pin.at, f"{1e3 * pin.pin_radius:g}", f"{1e3 * pin.radial_clearance:g}"] for pin in account.pins]
+        lines += ["", _clearance_title(scene.clearance), *_table([["", "pin radius mm", "radial clearance mm"], *pins])]
+    left_out = _table([*map(list, account.left_out.items())], left=2)
+    lines += ["", "Left out of the model (absent from the scene, zero or false)", *left_out]
     lines += ["", f"Unknowns per step: {account.unknowns}", *_unknowns(account)]
-    warnings = [oddity for oddity in oddities if not oddity.is_note]
-    lines += ["", *(f"Note: {oddity}" for oddity in oddities if oddity.is_note)]
+    lines += ["", *(f"Note: {note}" for note in notes)]
     lines += [f"Warnings: {len(warnings) or 'none'}", *(f"  {warning}" for warning in warnings)]
     return lines
 
@@ -204,10 +205,8 @@ def _oil(joint: JointAccount) -> str:
 def _linkages(account: Account) -> list[str]:
     rows = [["", "lever m", "links meet at"]]
     for joint in account.joints:
-        own = joint.linkage
-        links = "-" if own.transmission_deg is None else f"{own.transmission_deg:.0f} deg at least"
-        lever = f"{own.lever[0]:.3f} to {own.lever[1]:.3f}"
-        rows.append([f"joint {joint.number}", lever, links])
+        links = "-" if joint.transmission_deg is None else f"{joint.transmission_deg:.0f} deg at least"
+        rows.append([f"joint {joint.number}", f"{joint.lever[0]:.3f} to {joint.lever[1]:.3f}", links])
     return _table(rows, left=3)
 
 
@@ -225,12 +224,6 @@ def _clearance_title(clearance: Clearance) -> str:
     words = f"{law.law} contact, {given}, friction {law.friction:g}"
     linear = ", linearised at the preload" if clearance.treatment == "spring-damper" else ""
     return f"Pins with clearance ({words}{linear})"
-
-
-def _pins(account: Account) -> list[str]:
-    rows = [["", "pin radius mm", "radial clearance mm"]]
-    rows += [[pin.at, f"{1e3 * pin.pin_radius:g}", f"{1e3 * pin.radial_clearance:g}"] for pin in account.pins]
-    return _table(rows)
 
 
 def _unknowns(account: Account) -> list[str]:

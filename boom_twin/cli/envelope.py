@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from argparse import ArgumentParser, Namespace
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -40,18 +41,20 @@ def run(args: Namespace) -> int:
     from ..system.result_folder import ENVELOPE, result_folder
 
     scene = open_scene(args.scene)
-    if args.out is None:
-        values, lines = _examined(scene, None)
-    else:
-        with result_folder(args.out, ENVELOPE, files_of(args, "scene")) as building:
-            values, lines = _examined(scene, building)
+    with nullcontext() if args.out is None else result_folder(args.out, ENVELOPE, files_of(args, "scene")) as building:
+        result = _computed(scene)
+        quantities = quantities_of(result)
+        values, lines = _summary(result, quantities), _report(result, quantities)
+        if building is not None:
+            _write(building, result, quantities, values, scene)
+    if args.out is not None:
         lines += ["", *(f"Written: {args.out / name}" for name in ("envelope.csv", "envelope.json", "envelope.png"))]
     print_result(args.json, values, lines)
     return 0
 
 
-def _examined(scene: Scene, folder: Path | None) -> tuple[dict[str, Any], list[str]]:
-    """Compute the envelope; return the values of ``--json`` and the lines of text; write files into `folder`, if given."""
+def _computed(scene: Scene) -> Envelope:
+    """Compute the envelope, with progress on stderr."""
     from ..analysis.envelope import envelope
     from ..offline.progress import ProgressLine
 
@@ -64,12 +67,7 @@ def _examined(scene: Scene, folder: Path | None) -> tuple[dict[str, Any], list[s
         if done == total:
             bars[-1].close()
 
-    result = envelope(scene, progress)
-    quantities = quantities_of(result)
-    values = _summary(result, quantities)
-    if folder is not None:
-        _write(folder, result, quantities, values, scene)
-    return values, _report(result, quantities)
+    return envelope(scene, progress)
 
 
 def quantities_of(result: Envelope) -> list[Quantity]:

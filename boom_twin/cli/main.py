@@ -18,7 +18,8 @@ from contextlib import redirect_stderr, redirect_stdout, suppress
 from difflib import get_close_matches
 from importlib import import_module
 from keyword import iskeyword
-from typing import NoReturn, Protocol, TextIO, cast
+from types import ModuleType
+from typing import NoReturn, TextIO, cast
 
 from .. import __version__
 from ..errors import BoomTwinError
@@ -54,7 +55,10 @@ COMMANDS: dict[str, str] = {
     "study": "reports on the methods: error against run time",
     "rig": "make a synthetic session on the virtual rig (extra peers)",
 }
-"""Purpose of each command. The command is the module of that name in `boom_twin.cli`, with the functions of `Command`."""
+"""Purpose of each command, the module of that name in `boom_twin.cli`.
+
+Its function ``add_arguments(parser)`` declares the arguments, and ``run(args)`` runs the command and returns the exit code.
+"""
 
 EXAMPLES: dict[str, tuple[str, ...]] = {
     "check": ("check my_boom.yaml", "check my_boom.yaml --need tip=1mm"),
@@ -130,16 +134,6 @@ class CommandParser(ArgumentParser):
         return f". Did you mean {near[0]}?" if near else ""
 
 
-class Command(Protocol):
-    """Module of one command."""
-
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """Declare the arguments of the command."""
-
-    def run(self, args: Namespace) -> int:
-        """Run the command and return the exit code."""
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code; without `argv` that of the process, which has nothing else to do."""
     # New objects between two searches for garbage. Modules hold none, and looking through those of numba again and again takes
@@ -177,7 +171,7 @@ def _run(arguments: Sequence[str]) -> int:
         args = _parser(arguments).parse_args(arguments)
         name = f" {args.command}"
         with redirect_stderr(cast(TextIO, QuietStream(sys.stderr)) if args.quiet else sys.stderr):
-            code = _command(args.command).run(args)
+            code: int = _command(args.command).run(args)
         sys.stdout.flush()
         return code
     except BoomTwinError as error:
@@ -190,8 +184,8 @@ def _run(arguments: Sequence[str]) -> int:
     return 1
 
 
-def _command(name: str) -> Command:
-    return cast(Command, import_module(f".{name}_" if iskeyword(name) else f".{name}", __package__))
+def _command(name: str) -> ModuleType:
+    return import_module(f".{name}_" if iskeyword(name) else f".{name}", __package__)
 
 
 def _parser(arguments: Sequence[str]) -> ArgumentParser:

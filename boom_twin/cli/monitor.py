@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
-from ..monitor import PORT
+from ..monitor import ACTS, PORT
 from .arguments import add_ros_args, add_session, ros_arguments, window_of
 from .output import open_scene, open_session_scene, open_session_settings, tell, warn_incomplete
 
@@ -20,16 +20,8 @@ if TYPE_CHECKING:
     from ..monitor.data.feed import Feed
 
 
-ACTS = ("mark", "acknowledge")
-
-
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "--bag",
-        metavar="BAG",
-        type=Path,
-        help="a recorded session, or the bag of a replay (the live topics)",
-    )
+    parser.add_argument("--bag", metavar="BAG", type=Path, help="a recorded session, or the bag of a replay (the live topics)")
     add_session(parser)
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")

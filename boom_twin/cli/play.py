@@ -8,10 +8,10 @@ import sys
 import termios
 import tty
 from argparse import ArgumentParser, Namespace
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from ..bag.reader import scan
 from ..errors import BoomTwinError
@@ -80,7 +80,7 @@ def _play(player: Player, args: Namespace, length: float) -> None:
 
     def is_held() -> bool:
         nonlocal is_paused
-        if keys.pressed().count(" ") % 2:
+        if pressed is not None and pressed().count(" ") % 2:
             is_paused = not is_paused
             show("paused" if is_paused else "playing")
         return is_paused
@@ -92,8 +92,8 @@ def _play(player: Player, args: Namespace, length: float) -> None:
         else:
             tell(f"{word}, {line.done:.1f} of {length:.1f} s")
 
-    with Keys() as keys:
-        if keys.are_read:
+    with keys_of_terminal() as pressed:
+        if pressed is not None:
             tell("space: pause and go on; Ctrl-C: end")
         if not sys.stderr.isatty():
             tell(f"playing {length:.1f} s")
@@ -116,27 +116,24 @@ def _check_listeners(unmatched: list[str], unheard: list[str], topics: int, args
     warn(f"{listeners} to {', '.join(unmatched)}")
 
 
-class Keys:
-    """Keys of the terminal within a context; none if stdin is no terminal, or that of another program."""
-
-    def __init__(self) -> None:
-        self.are_read = False
-
-    def __enter__(self) -> Self:
+@contextmanager
+def keys_of_terminal() -> Iterator[Callable[[], str] | None]:
+    """Provide a function that returns the keys pressed since its last call; None if stdin is no terminal of this program."""
+    if not _is_ours():
+        yield None
+        return
+    before = termios.tcgetattr(sys.stdin)
+    tty.setcbreak(sys.stdin, termios.TCSADRAIN)
+    try:
+        yield _pressed
+    finally:
         if _is_ours():
-            self.are_read, self._before = True, termios.tcgetattr(sys.stdin)
-            tty.setcbreak(sys.stdin, termios.TCSADRAIN)
-        return self
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if self.are_read and _is_ours():
-            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
-    def pressed(self) -> str:
-        """Return the keys pressed since the last call."""
-        if not self.are_read or not _is_ours() or not select.select([sys.stdin], [], [], 0.0)[0]:
-            return ""
-        return os.read(sys.stdin.fileno(), 100).decode(errors="replace")
+def _pressed() -> str:
+    is_waiting = _is_ours() and select.select([sys.stdin], [], [], 0.0)[0]
+    return os.read(sys.stdin.fileno(), 100).decode(errors="replace") if is_waiting else ""
 
 
 def _is_ours() -> bool:

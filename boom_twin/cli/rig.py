@@ -114,15 +114,7 @@ def run(args: Namespace) -> int:
     from ..bag.session_writer import samples_in_rows, write_samples
     from ..offline.ground_truth import FILE_NAME
     from ..system.result_folder import RIG, result_folder
-    from ..validation.rig import (
-        BUNDLED_DURATION,
-        Sensors,
-        bundled,
-        faults,
-        loads,
-        random_programme,
-        through_postures,
-    )
+    from ..validation.rig import BUNDLED_DURATION, Sensors, bundled, faults, loads, random_programme, through_postures
     from ..validation.rig import record as record_session
 
     assumed, out = scene_from(args.scene), Path(args.out)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, ValidationInfo, model_validator
-from pydantic.fields import FieldInfo
 
 from ..errors import UsageError
 from ..sensor_kinds import SensorKind
@@ -123,11 +122,6 @@ def setting(default: float, unit: str, bounds: Mapping[str, Any], meaning: str, 
     return Field(default=default, description=text, allow_inf_nan=False, json_schema_extra={"live": live}, **bounds)
 
 
-def is_live(field: FieldInfo) -> bool:
-    """Return True if a setting can change while the twin runs."""
-    return isinstance(field.json_schema_extra, dict) and bool(field.json_schema_extra["live"])
-
-
 class Thresholds(_Table):
     """Thresholds of ``/diagnostics``, in SI units. They can change at any time and do not affect the prediction."""
 
@@ -169,8 +163,7 @@ def load_thresholds(path: Path, namespace: str = "") -> Thresholds:
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
 NODE_ONLY = ("scene", "mapping", "health", "causes", "frame_prefix", "hardware_id", "autostart", "monitor")
-STROKE_RATE = 0.5
-"""Upper bound of a cylinder's speed, m/s."""
+STROKE_RATE = 0.5  # m/s, upper bound of a cylinder's speed
 
 
 class Settings(_Table):
@@ -208,7 +201,8 @@ class Settings(_Table):
     @classmethod
     def live_names(cls) -> tuple[str, ...]:
         """Return the names of the settings that can change while the twin runs."""
-        return tuple(name for name, field in cls.model_fields.items() if is_live(field))
+        extras = {name: field.json_schema_extra for name, field in cls.model_fields.items()}
+        return tuple(name for name, extra in extras.items() if isinstance(extra, dict) and extra["live"])
 
     @property
     def live(self) -> dict[str, float]:

@@ -23,10 +23,8 @@ from ..errors import BoomTwinError, Fault, FaultKind
 from ..system.received_files import open_received
 from ..system.terminal_text import printable
 
-LARGEST_FILE = 4 * 2**20
-"""Size limit of a file that is read, bytes."""
-MOST_VALUES = 50_000
-"""Limit for the number of values in a file, with aliases expanded."""
+LARGEST_FILE = 4 * 2**20  # bytes, size limit of a file that is read
+MOST_VALUES = 50_000  # number of values in a file at most, with aliases expanded
 DEEPEST = 20
 
 TAG = "tag:yaml.org,2002:"

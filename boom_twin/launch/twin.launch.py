@@ -67,9 +67,9 @@ def everything(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     scene = load_scene(values["scene"] or None)
     load_mapping(Path(values["mapping"]) if values["mapping"] else None, len(scene.joints))
     found: list[LaunchDescriptionEntity] = [twin(given, values)]
-    if is_set(given, "state_publisher"):
+    if given["state_publisher"] == "true":
         found.append(state_publisher(given, values, scene))
-    if is_set(given, "rviz"):
+    if given["rviz"] == "true":
         Path(given["rviz_config"]).read_bytes()
         found.append(rviz(given, values))
     if given["record"]:
@@ -92,18 +92,13 @@ def check_packages(given: Given) -> None:
     """Raise BoomTwinError if the package of a requested action is missing."""
     needed = {"boom_twin": "source install/setup.bash of its workspace"}
     for name, package in (("state_publisher", "robot_state_publisher"), ("rviz", "rviz2")):
-        if is_set(given, name):
+        if given[name] == "true":
             needed[package] = f"install it, or say {name}:=false"
     for package, remedy in needed.items():
         try:
             get_package_prefix(package)
         except PackageNotFoundError:
             raise BoomTwinError(f"package {package} is not in AMENT_PREFIX_PATH: {remedy}") from None
-
-
-def is_set(given: Given, name: str) -> bool:
-    """Return True if a flag is ``true``."""
-    return given[name] == "true"
 
 
 def as_launched(values: Values) -> Values:
@@ -127,7 +122,7 @@ def twin(given: Given, values: Values) -> Node:
 def state_publisher(given: Given, values: Values, scene: Scene) -> Node:
     """Return ``robot_state_publisher``, which sends TF up to the deflected tip from the twin's joint states."""
     own = {name: values[name] for name in ("frame_prefix", "use_sim_time")}
-    own |= {"robot_description": urdf(scene), "ignore_timestamp": is_set(given, "ignore_timestamp")}
+    own |= {"robot_description": urdf(scene), "ignore_timestamp": given["ignore_timestamp"] == "true"}
     return Node(
         package="robot_state_publisher",
         executable="robot_state_publisher",
@@ -148,13 +143,8 @@ def rviz(given: Given, values: Values) -> IncludeLaunchDescription:
 def recorder(given: Given, values: Values) -> ExecuteProcess:
     """Return the recorder beside the node, with the node's scene, parameters, mapping and namespace."""
     check_lasting(Path(given["record"]))
-    options = {
-        "--out": given["record"],
-        "--scene": given["scene"],
-        "--params": given["params_file"],
-        "--mapping": values["mapping"],
-        "--namespace": given["namespace"],
-    }
+    options = {"--out": given["record"], "--scene": given["scene"], "--params": given["params_file"]}
+    options |= {"--mapping": values["mapping"], "--namespace": given["namespace"]}
     command = python_command("boom_twin.cli.main", "record")
     command += [part for option, value in options.items() if value for part in (option, value)]
     return ExecuteProcess(cmd=command, name="record", output="screen")

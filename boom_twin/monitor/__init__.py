@@ -1,3 +1,4 @@
 """The live page: server, viewers, protocol."""
 
 PORT = 8420
+ACTS = ("mark", "acknowledge")  # what viewers may do, if it is permitted

@@ -114,13 +114,8 @@ MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64  # largest number of silent or accepte
 class Connections:
     """Connections to one server: silent ones, and those of which a request was accepted."""
 
-    def __init__(self, server: web.Server) -> None:
-        self._server = server
+    def __init__(self) -> None:
         self._all: dict[Connection, bool] = {}  # True if accepted; in order of last use
-
-    def __call__(self) -> Connection:
-        """Return a new connection, as `asyncio.loop.create_server` requires."""
-        return Connection(self._server, self)
 
     def count(self, connection: Connection, is_accepted: bool) -> None:
         """Count a connection as the newest of its kind; cut off the oldest one if there are too many."""

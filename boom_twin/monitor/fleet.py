@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 from aiohttp import ClientError, ClientSession, ClientTimeout
-from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
 from ..errors import UsageError
@@ -129,10 +129,6 @@ class AlarmWatch:
         self._known: dict[int, tuple[str | None, bool]] = {}  # (cause, has ended) by number of the alarm
         self.begun: Counter[tuple[str, str]] = Counter()  # alarms so far, by channel and kind
 
-    def active(self) -> list[ListedAlarm]:
-        """Return the active alarms."""
-        return [alarm for alarm in self._feed.store.alarms.all if alarm.fault and alarm.end is None]
-
     def changes(self) -> list[dict[str, Any]]:
         """Return the changes since the last call, as plain values for JSON, oldest alarm first.
 
@@ -181,7 +177,7 @@ AXES = ("x", "z")
 
 
 class Metrics:
-    """Metrics of one feed. The package `prometheus_client` calls `collect`.
+    """Metrics of one feed. The package `prometheus_client` calls `collect` of this `Collector`.
 
     Metrics of tip and residuals are left out if no sample came for `SILENCE` seconds. `watch` has the alarms of the feed.
     """
@@ -203,13 +199,7 @@ class Metrics:
 
     def text(self) -> tuple[bytes, str]:
         """Return all metrics and their content type."""
-        registry = CollectorRegistry()
-        registry.register(self)
-        return generate_latest(registry), CONTENT_TYPE_LATEST
-
-    def describe(self) -> list[Any]:
-        """Return no descriptions: they depend on the sensors of the boom."""
-        return []
+        return generate_latest(self), CONTENT_TYPE_LATEST
 
     def collect(self) -> Iterator[Any]:
         """Yield all metrics."""
@@ -276,10 +266,8 @@ class Metrics:
         )
 
     def _alarms(self) -> Iterator[Any]:
-        active: dict[tuple[str, str, str], int] = {}
-        for alarm in self._watch.active():
-            key = alarm.name, alarm.fault, alarm.cause or ""
-            active[key] = active.get(key, 0) + 1
+        lasting = [alarm for alarm in self._feed.store.alarms.all if alarm.fault and alarm.end is None]
+        active = Counter((alarm.name, alarm.fault, alarm.cause or "") for alarm in lasting)
         labels = "channel", "kind", "cause"
         yield self._gauge("alarms_active", "Alarms that last; an empty cause is not known.", [*active.items()], *labels)
         yield self._counter("alarms", "Alarms since the monitor started.", [*self._watch.begun.items()], *labels[:2])

@@ -16,14 +16,14 @@ from ..messages.topic_table import Topics, load_topics
 from ..twin.sample_check import merged
 from ..twin.twin import Twin
 from ..types import Report, Sample
-from . import PORT
+from . import ACTS, PORT
 from .access_control import AccessControl
 from .data.bag_feed import TwinView
 from .data.feed import Feed
 from .data.status import Severity, text
 from .data.store import Store
 from .server import Server, serving
-from .viewer import ACTS, ViewerActions
+from .viewer import ViewerActions
 
 
 class SourceFeed(Feed):
@@ -94,7 +94,7 @@ class LivePage:
         for each in self._twin.samples(sample, stamp_ns) if isinstance(sample, Mapping) else [sample]:
             reports.append(self._twin.update(each))
             self._feed.put(each, reports[-1])
-        return reports[0] if len(reports) == 1 else merged(reports)
+        return merged(reports)
 
     def __enter__(self) -> Self:
         self._twin.warm_up()

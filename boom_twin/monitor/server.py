@@ -135,7 +135,7 @@ async def serving(server: Server, access: AccessControl, host: str, port: int | 
     await runner.setup()
     assert runner.server is not None
     try:
-        listener = await _listen(Connections(runner.server), host, port)
+        listener = await _listen(partial(Connection, runner.server, Connections()), host, port)
         number = listener.sockets[0].getsockname()[1]
         yield f"http://{in_address(host)}:{number}/" + (f"?token={access.token}" if access.token else "")
         listener.close()
@@ -143,9 +143,9 @@ async def serving(server: Server, access: AccessControl, host: str, port: int | 
         await runner.cleanup()
 
 
-async def _listen(connections: Connections, host: str, port: int | None) -> asyncio.Server:
+async def _listen(connection: Callable[[], Connection], host: str, port: int | None) -> asyncio.Server:
     backlog = 128  # connections that may wait to be accepted; the kernel refuses more
-    listen = partial(asyncio.get_running_loop().create_server, connections, host, backlog=backlog)
+    listen = partial(asyncio.get_running_loop().create_server, connection, host, backlog=backlog)
     try:
         return await listen(PORT if port is None else port)
     except OSError as error:

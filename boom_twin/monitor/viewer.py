@@ -30,7 +30,6 @@ NEWEST_ROW_ONLY = "shape"  # table of which only the newest row is sent
 
 
 NO_TEXT = ("Cc", "Cs")  # unicode categories that cannot be published: control characters and surrogates
-ACTS = ("mark", "acknowledge")
 
 
 class ViewerActions:
@@ -91,14 +90,9 @@ class Viewer:
         state_period = 0.5
         period = 1.0 / 30.0  # seconds between two messages of rows
         feed, told = self._feed, -state_period
+        permitted = sorted(self._actions.permitted)
         await self._send_text(
-            {
-                "kind": "hello",
-                "title": feed.title,
-                "end": feed.end,
-                "permitted": sorted(self._actions.permitted),
-                "history": HISTORY,
-            }
+            {"kind": "hello", "title": feed.title, "end": feed.end, "permitted": permitted, "history": HISTORY}
         )
         last = time.monotonic()
         statuses = None

@@ -92,8 +92,7 @@ def _text(table: BoomTable, source: str, first: float | None) -> str:
     return with_end_mark("\n".join([*lines, "", *_postures(table)]))
 
 
-Row = tuple[str, Any, str]
-"""Key, value, comment."""
+Row = tuple[str, Any, str]  # key, value, comment
 
 
 def _section(table: BoomTable, section: BoxSection, first: float | None) -> list[Row]:

@@ -40,7 +40,7 @@ def linkage_of(joint: JointGeometry, base: Base | None, first: Section | None) -
     row["cx"], row["cy"] = joint.C  # type: ignore[misc]  # validated: B has C, D, E, lL, lR
     row["dx"], row["dy"] = joint.D  # type: ignore[misc]
     row["ex"], row["ey"] = joint.E  # type: ignore[misc]
-    row["length_l"], row["length_r"], row["side"] = joint.lL, joint.lR, joint.side_sign
+    row["length_l"], row["length_r"], row["side"] = joint.lL, joint.lR, -1.0 if joint.side == "right" else 1.0
     if joint.kind == "B1":
         row["mount"], row["along"] = LINK_L, joint.lL
     elif joint.kind == "B2":
@@ -242,20 +242,13 @@ class JointPins:
 class Skeleton:
     """An undeformed boom of n sections."""
 
-    headings: Array
-    """Orientation of every section, rad, shape (n,)."""
-    pivots: Array
-    """Inboard pivots, then the tip, m, shape (n + 1, 2)."""
+    headings: Array  # orientation of every section, rad, shape (n,)
+    pivots: Array  # inboard pivots, then the tip, m, shape (n + 1, 2)
     joints: tuple[JointPins, ...]
 
-    def point(self, section: int, x: float, y: float = 0.0) -> Array:
-        """Return a point given in the axes of `section` (0-based), m, in the model frame."""
-        return placed(self.pivots[section], float(self.headings[section]), (x, y))
-
-
-def placed(origin: Array, heading: float, point: tuple[float, float]) -> Array:
-    """Return `point` of a frame at `origin` turned by `heading` (rad), shape (2,)."""
-    return np.asarray(origin + np.array(turned(heading, point[0], point[1])))
+    def point(self, section: int, x: float) -> Array:
+        """Return the point at `x` (m) on the axis of `section` (0-based), in the model frame, shape (2,)."""
+        return np.asarray(self.pivots[section] + np.array(turned(float(self.headings[section]), x, 0.0)))
 
 
 def rigid_chain(pivot: Array, lengths: Array, angles: Array) -> tuple[Array, Array]:

@@ -86,13 +86,9 @@ def _syntax_fault(text: str, error: Exception) -> Fault:
         what = str(error)
     what = " ".join(what.split())
     shown = rows[line - 1].strip() if line else text[:40].strip()
-    return Fault("text", shown, f"this is not valid YAML, {what}", _yaml_remedy(what), line)
-
-
-def _yaml_remedy(what: str) -> str:
-    if "\\t" in what:
-        return "Indent with spaces, not with tabs."
-    return "Mend the text on this line or just above it: brackets, commas, colons, indentation."
+    remedy = "Mend the text on this line or just above it: brackets, commas, colons, indentation."
+    remedy = "Indent with spaces, not with tabs." if "\\t" in what else remedy
+    return Fault("text", shown, f"this is not valid YAML, {what}", remedy, line)
 
 
 class _SceneReader(YamlReader):

@@ -16,8 +16,7 @@ import numpy as np
 from ..kernels.elements.cylinder import OIL, oil_compliance
 from .schema import Cylinder
 
-STATIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Shares of the full stroke at which k is told."""
+STATIONS = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of the full stroke at which k is told
 
 
 def oil_record(cylinder: Cylinder) -> np.record:
@@ -42,8 +41,3 @@ def stiffness(cylinder: Cylinder, stroke: float) -> float:
 def middle_stiffness(cylinder: Cylinder) -> float:
     """Return k (N/m) in the middle of the stroke."""
     return stiffness(cylinder, 0.5 * cylinder.max_stroke)
-
-
-def stiffness_over_stroke(cylinder: Cylinder) -> tuple[float, ...]:
-    """Return k (N/m) at each of `STATIONS`."""
-    return tuple(stiffness(cylinder, share * cylinder.max_stroke) for share in STATIONS)

@@ -11,8 +11,7 @@ import numpy as np
 
 from ..types import Array
 
-CHANGE_OVER = 0.1
-"""Seconds from no force to the full one, and back."""
+CHANGE_OVER = 0.1  # s from no force to the full one, and back
 
 
 def ease(x: Array) -> Array:

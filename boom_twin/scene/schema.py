@@ -198,11 +198,6 @@ class JointGeometry(Part):
     mL: NotNegative | None = Field(default=None, description="the mass of link L, kg")
     mR: NotNegative | None = Field(default=None, description="the mass of link R, kg")
 
-    @property
-    def side_sign(self) -> float:
-        """Side of D->E on which the links meet: 1 left, -1 right."""
-        return -1.0 if self.side == "right" else 1.0
-
 
 class Joint(JointGeometry):
     """Joint with its cylinder."""

@@ -8,41 +8,31 @@ from dataclasses import dataclass
 import numpy as np
 
 from .kinematics import RANGE_SAMPLES, joint_curve, linkage, stroke_range
-from .oil_spring import stiffness_over_stroke
+from .oil_spring import STATIONS, stiffness
 from .schema import IDEAL_BELOW, Joint, Pin, Scene, Section
 from .segmentation import Split, flexible_parts, splits
 
 
-@dataclass(frozen=True, slots=True)
-class LeftOut:
-    """A key that the scene does not name, and what the model therefore is."""
-
-    key: str
-    meaning: str
-
-
-def left_out(scene: Scene) -> tuple[LeftOut, ...]:
-    """Return one entry per key that is absent somewhere, in the order sections, joints, the rest."""
+def left_out(scene: Scene) -> dict[str, str]:
+    """Return what the model is without each key that is absent somewhere, by key: sections, joints, the rest."""
     found = _absent("sections", [_absent_in_section(scene, i) for i in range(len(scene.sections))])
-    found += _absent("joints", [_absent_in_joint(joint) for joint in scene.joints])
+    found |= _absent("joints", [_absent_in_joint(joint) for joint in scene.joints])
     if not scene.payload:
-        found.append(LeftOut("tip.payload", "no mass at the tip"))
+        found["tip.payload"] = "no mass at the tip"
     if not scene.line_fill:
-        found.append(LeftOut("line_fill", "the pipe line is empty"))
+        found["line_fill"] = "the pipe line is empty"
     if not scene.base.inclination:
-        found.append(LeftOut("base.inclination", "the base stands level"))
+        found["base.inclination"] = "the base stands level"
     if scene.base.stiffness is None:
-        found.append(LeftOut("base.stiffness", "the base is rigid"))
+        found["base.stiffness"] = "the base is rigid"
     elif not scene.base.damping:
-        found.append(LeftOut("base.damping", "no damping in the hinge of the base"))
-    if scene.clearance is None or not scene.clearance.pins:
-        return (*found, LeftOut("clearance", "ideal pins"))
-    tight = [i for i, pin in enumerate(scene.clearance.pins) if pin.radial_clearance < IDEAL_BELOW]
-    if tight:
-        where = ", ".join(map(str, tight))
-        meaning = f"below {IDEAL_BELOW * 1e6:g} um, so the pin is ideal"
-        found.append(LeftOut(f"clearance.pins[{where}].radial_clearance", meaning))
-    return tuple(found)
+        found["base.damping"] = "no damping in the hinge of the base"
+    pins = () if scene.clearance is None else scene.clearance.pins
+    if not pins:
+        found["clearance"] = "ideal pins"
+    if tight := ", ".join(str(i) for i, pin in enumerate(pins) if pin.radial_clearance < IDEAL_BELOW):
+        found[f"clearance.pins[{tight}].radial_clearance"] = f"below {IDEAL_BELOW * 1e6:g} um, so the pin is ideal"
+    return found
 
 
 def _absent_in_section(scene: Scene, i: int) -> dict[str, str]:
@@ -77,14 +67,14 @@ def _absent_in_joint(joint: Joint) -> dict[str, str]:
     return absent
 
 
-def _absent(block: str, items: list[dict[str, str]]) -> list[LeftOut]:
+def _absent(block: str, items: list[dict[str, str]]) -> dict[str, str]:
     """Return one entry per key, for all items of a list that lack it: ``sections[1, 3].beta``."""
     keys = dict.fromkeys((key, meaning) for item in items for key, meaning in item.items())
-    found = []
+    found = {}
     for key, meaning in keys:
         where = [str(i) for i, item in enumerate(items) if item.get(key) == meaning]
         index = "*" if len(where) == len(items) > 1 else ", ".join(where)
-        found.append(LeftOut(f"{block}[{index}].{key}", meaning))
+        found[f"{block}[{index}].{key}"] = meaning
     return found
 
 
@@ -116,29 +106,12 @@ class SectionAccount:
         return len(self.parts) * (self.bending + self.axial)
 
 
-@dataclass(frozen=True)
-class LinkageAccount:
-    """A joint over its range."""
-
-    lever: tuple[float, float]
-    """Least and greatest ds/dphi, m."""
-    transmission_deg: float | None
-    """Least angle between the links; None for kind A."""
-
-
-def linkage_account(scene: Scene, i: int) -> LinkageAccount:
-    """Return what joint `i` (0-based) of a scene does over its range."""
-    row, degrees = linkage(scene, i), np.linspace(*scene.joints[i].range_deg, RANGE_SAMPLES)
-    _, levers, between = joint_curve(row, np.radians(degrees))
-    lever, least = (float(np.nanmin(levers)), float(np.nanmax(levers))), float(np.nanmin(between)) if i else None
-    return LinkageAccount(lever, least)
-
-
 @dataclass(frozen=True, slots=True)
 class JointAccount:
     """Joint `number` (from 1) with its links and its cylinder.
 
-    ``stroke_low``, ``stroke_high`` (m) are reached over ``range_deg`` where links close and the cylinder reaches.
+    ``stroke_low``, ``stroke_high`` (m) are reached over ``range_deg`` where links close and the cylinder reaches. ``lever`` is
+    the least and the greatest ds/dphi (m) over it, ``transmission_deg`` the least angle between the links, None for kind A.
     ``k_over_stroke`` (N/m) is at `boom_twin.scene.oil_spring.STATIONS` for a cylinder with oil, else empty.
     """
 
@@ -147,7 +120,8 @@ class JointAccount:
     stroke_low: float
     stroke_high: float
     k_over_stroke: tuple[float, ...]
-    linkage: LinkageAccount
+    lever: tuple[float, float]
+    transmission_deg: float | None
 
     @property
     def unknowns(self) -> int:
@@ -163,7 +137,7 @@ class Account:
     sections: tuple[SectionAccount, ...]
     joints: tuple[JointAccount, ...]
     pins: tuple[Pin, ...]
-    left_out: tuple[LeftOut, ...]
+    left_out: dict[str, str]  # see `left_out`
 
     @property
     def mass(self) -> float:
@@ -212,7 +186,9 @@ def _section(scene: Scene, i: int) -> SectionAccount:
 
 
 def _joint(scene: Scene, i: int) -> JointAccount:
-    joint = scene.joints[i]
+    joint, cylinder = scene.joints[i], scene.joints[i].cylinder
     low, high = stroke_range(scene, i, RANGE_SAMPLES)
-    oil = () if joint.cylinder.oil is None else stiffness_over_stroke(joint.cylinder)
-    return JointAccount(i + 1, joint, low, high, oil, linkage_account(scene, i))
+    oil = () if cylinder.oil is None else tuple(stiffness(cylinder, share * cylinder.max_stroke) for share in STATIONS)
+    _, levers, between = joint_curve(linkage(scene, i), np.radians(np.linspace(*joint.range_deg, RANGE_SAMPLES)))
+    lever = float(np.nanmin(levers)), float(np.nanmax(levers))
+    return JointAccount(i + 1, joint, low, high, oil, lever, float(np.nanmin(between)) if i else None)

@@ -19,8 +19,7 @@ from ..types import Array
 TOGETHER = 4096  # rows in memory
 LONGEST_LINE = 2**16  # limit for the number of characters in a line
 
-NOTHING = {"", "-", "nan", "null", "none", "na", "n/a", "#n/a"}
-"""Texts of cells without a value, in lower case."""
+NOTHING = {"", "-", "nan", "null", "none", "na", "n/a", "#n/a"}  # texts of cells without a value, in lower case
 
 _MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 """Encodings by the byte order mark at the start of a file."""

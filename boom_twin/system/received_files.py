@@ -16,14 +16,8 @@ from pathlib import Path
 
 from ..errors import BagError
 
-_KINDS = (
-    (stat.S_ISLNK, "a symbolic link"),
-    (stat.S_ISDIR, "a directory"),
-    (stat.S_ISFIFO, "a named pipe"),
-    (stat.S_ISSOCK, "a socket"),
-    (stat.S_ISBLK, "a device"),
-    (stat.S_ISCHR, "a device"),
-)
+_KINDS = {"l": "a symbolic link", "d": "a directory", "p": "a named pipe", "s": "a socket", "b": "a device", "c": "a device"}
+"""Kinds of entries that are no regular files, by the first letter of `stat.filemode`."""
 
 
 def real_path(path: Path) -> Path:
@@ -64,7 +58,7 @@ def _without_links(path: str, flags: int) -> int:
 
 def _check_regular(path: Path, mode: int) -> None:
     if not stat.S_ISREG(mode):
-        kind = next((name for is_kind, name in _KINDS if is_kind(mode)), "no regular file")
+        kind = _KINDS.get(stat.filemode(mode)[0], "no regular file")
         remedy = "Copy the folder with its links followed, `cp -rL FOLDER COPY`, and read the copy."
         raise BagError(f"{path}: {kind}, not opened in a session's folder. {remedy if stat.S_ISLNK(mode) else 'Move it away.'}")
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from command import main
+from command import answer, main
 from default_boom import default_text
 
 
@@ -31,8 +31,7 @@ def test_a_scene_without_end_mark_is_noted_and_strict_lets_it_pass(
     assert main(["check", str(path), "--strict"]) == code
     out, err = capsys.readouterr()
     assert ("Note: line" in out and "Warnings: none" in out) if code == 0 else "it may have been cut off" in err
-    assert main(["check", str(path), "--json"]) == 0
-    values = json.loads(capsys.readouterr().out)
+    values = answer(capsys, "check", str(path))
     assert [len(values[key]) for key in ("notes", "warnings")] == [1 - code, code]
     assert main(["statics", str(path), "--posture", "arch"]) == 0
     assert capsys.readouterr().err.startswith(f"{'warning' if code else 'note'}: {path}: line ")

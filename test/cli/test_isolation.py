@@ -21,15 +21,8 @@ BUNDLED = PACKAGE.parent / "bags" / "arch_session"
 COMMAND = [sys.executable, "-P", "-m", "boom_twin.cli.main"]  # as the console script: no working directory on sys.path
 
 
-@pytest.fixture
-def trap(tmp_path: Path) -> Trap:
-    """A received session with hostile modules beside it and in it; both are worked in."""
-    shutil.copytree(BUNDLED, tmp_path / "received" / "bag")
-    return trap_of(tmp_path)
-
-
 def trap_of(folder: Path) -> Trap:
-    """Hostile modules around the session in ``received/bag``."""
+    """Hostile modules beside the session in ``received/bag`` and in it; both are worked in."""
     Trap(folder / "received" / "bag", folder / "traces")
     return Trap(folder / "received", folder / "traces")
 
@@ -45,8 +38,10 @@ def test_a_replay_runs_nothing_of_the_folder(tmp_path: Path, place: str) -> None
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["samples"] == count
 
 
-def test_the_page_of_a_session_runs_nothing_of_the_folder(trap: Trap, tmp_path: Path) -> None:
+def test_the_page_of_a_session_runs_nothing_of_the_folder(tmp_path: Path) -> None:
     pytest.importorskip("aiohttp")
+    shutil.copytree(BUNDLED, tmp_path / "received" / "bag")
+    trap = trap_of(tmp_path)
     command, log = [*COMMAND, "monitor", "--bag", "bag", "--port", "0"], tmp_path / "log"
     with log.open("w") as file, subprocess.Popen(command, cwd=tmp_path / "received", stdout=file, stderr=file) as process:
         end = time.monotonic() + 240.0

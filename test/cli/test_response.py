@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from command import main
+from command import answer, main
 from oracle import booms
 
 from boom_twin import frequency_response, load_scene, statics
 
 Capture = pytest.CaptureFixture[str]
-
-
-def answer(capsys: Capture, *given: str) -> dict[str, Any]:
-    assert main(["response", *given, "--json"]) == 0
-    return dict(json.loads(capsys.readouterr().out))
 
 
 def table(path: Path) -> dict[str, np.ndarray]:
@@ -28,7 +22,7 @@ def table(path: Path) -> dict[str, np.ndarray]:
 
 def test_response_is_that_of_the_function_and_has_the_natural_frequencies(capsys: Capture, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    found = answer(capsys, "--posture", "arch", "--tip", "3,4", "--out", str(out))
+    found = answer(capsys, "response", "--posture", "arch", "--tip", "3,4", "--out", str(out))
     frequencies = np.array(found["frequency_Hz"])
     assert len(frequencies) == 304 and np.all(np.diff(frequencies) > 0.0)
     expected = frequency_response(load_scene(), frequencies, posture="arch", tip_force=(3.0, 4.0)).channels()
@@ -44,7 +38,9 @@ def test_response_is_that_of_the_function_and_has_the_natural_frequencies(capsys
 def test_lengths_are_those_of_the_boom_at_rest(load: tuple[str, ...], capsys: Capture) -> None:
     rest = statics(None, "arch")
     places = ("--strokes", rest.strokes), ("--lengths", rest.lengths)
-    drives, lengths = (answer(capsys, f"{name}={','.join(map(repr, each.tolist()))}", *load) for name, each in places)
+    drives, lengths = (
+        answer(capsys, "response", f"{name}={','.join(map(repr, each.tolist()))}", *load) for name, each in places
+    )
     for key, values in drives.items():
         assert key in ("load", "warnings") or lengths[key] == pytest.approx(values, rel=1e-6, abs=1e-9)
     assert main(["response", "--lengths", "0.6,0.1", *load]) == 1
@@ -54,7 +50,7 @@ def test_lengths_are_those_of_the_boom_at_rest(load: tuple[str, ...], capsys: Ca
 def test_map_of_postures(capsys: Capture, tmp_path: Path) -> None:
     out = tmp_path / "out"
     given = ["--map", "horizontal,arch", "--pump", "0.4:50", "--rates", "0.28:0.42:15", "--out", str(out)]
-    found = answer(capsys, *given)
+    found = answer(capsys, "response", *given)
     assert found["postures"] == ["horizontal", "arch"]
     assert np.array(found["swing_m"]).shape == (2, 15)
     assert set(found["avoid_posture"]) == set(found["postures"]) and set(found["avoid_harmonic"]) == {3}
@@ -103,8 +99,7 @@ def test_without_damping_no_amplitude_is_made_up_at_a_resonance(capsys: Capture,
     for section in spec["sections"]:
         section.pop("beta", None)
     (tmp_path / "undamped.yaml").write_text(json.dumps(spec))
-    assert main(["response", str(tmp_path / "undamped.yaml"), "--posture", "arch", "--to", "3", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = answer(capsys, "response", str(tmp_path / "undamped.yaml"), "--posture", "arch", "--to", "3")
     assert len(found["frequency_Hz"]) == 300 and len(found["natural_frequencies_Hz"]) == 2
     assert max(found["tip_y_m_amplitude"]) < 0.1
     assert "nothing damps the resonances at 1.06" in found["warnings"][0]

@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 
 pytest.importorskip("exudyn")
 
-from command import main
+from command import answer, main
 from default_boom import anew
 from oracle import booms
 from recordings import load_truth, read, scan
@@ -36,37 +36,26 @@ def made(scene: Path, out: Path, *more: str) -> Path:
     return out
 
 
-def replayed_folder(scene: Path, bag: Path) -> Path:
-    """What replay makes of it."""
-    out = bag.with_name(f"{bag.name}_out")
-    assert main(["replay", str(bag), "--scene", str(scene), "--out", str(out)]) == 0
-    return out
-
-
 def replayed(scene: Path, bag: Path) -> dict[str, Any]:
-    """What replay says of it."""
-    replayed_folder(scene, bag)
-    return summary_of(bag)
+    """The summary of its replay, which lies beside it."""
+    assert main(["replay", str(bag), "--scene", str(scene), "--out", f"{bag}_out"]) == 0
+    return dict(json.loads(Path(f"{bag}_out", "summary.json").read_text()))
 
 
 @pytest.fixture(scope="module")
-def healthy(scene: Path) -> Path:
-    """A session without faults and loads, replayed."""
-    replayed_folder(scene, bag := made(scene, scene.with_name("healthy")))
-    return bag
+def healthy(scene: Path) -> tuple[Path, dict[str, Any]]:
+    """A session without faults and loads, and the summary of its replay."""
+    bag = made(scene, scene.with_name("healthy"))
+    return bag, replayed(scene, bag)
 
 
-def summary_of(bag: Path) -> dict[str, Any]:
-    return dict(json.loads((bag.with_name(f"{bag.name}_out") / "summary.json").read_text()))
-
-
-def test_faulty_sessions_replay(scene: Path, healthy: Path, tmp_path: Path) -> None:
+def test_faulty_sessions_replay(scene: Path, healthy: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
     faults = ["--fault", "cylinder_1.k:softer:0.5", "--fault", "joint_1.sensor:bias:0.01@1", "--fault"]
     bag = made(scene, tmp_path / "faulty", *faults, "joint_angles.delay:late:0.02@2")
     notes = scan(bag).notes
     assert notes["faults"] == "cylinder_1.k:softer:0.5, joint_1.sensor:bias:0.01@1, joint_angles.delay:late:0.02@2"
     assert "synthetic" in notes["origin"] and "wrong" not in notes
-    faulty, sound = replayed(scene, bag), summary_of(healthy)
+    faulty, (_, sound) = replayed(scene, bag), healthy
     assert faulty["samples"] == sound["samples"]
     assert sound["joint_residual_rms_rad"][0] < 3e-4
     assert faulty["joint_residual_rms_rad"][0] == pytest.approx(0.01 * np.sqrt(2 / 3), rel=0.2)
@@ -78,9 +67,7 @@ def test_sessions_of_lengths_and_of_drives_are_told(scene: Path, tmp_path: Path,
     drives = tmp_path / "drives.yaml"
     drives.write_text("inputs: {cylinder_strokes: {reads: drive}}\n")
     for session, more, reading in ((bag, [], "length"), (bag, ["--mapping", str(drives)], "drive"), (ARCH_DRIVES, [], "drive")):
-        capsys.readouterr()
-        assert main(["info", str(session), *more, "--json"]) == 0
-        assert json.loads(capsys.readouterr().out)["strokes"] == reading
+        assert answer(capsys, "info", str(session), *more)["strokes"] == reading
         assert main(["info", str(session), *more]) == 0
         assert f"strokes    are {reading}s of the cylinders (" in capsys.readouterr().out
     assert replayed(scene, bag)["strokes"] == "length"
@@ -90,7 +77,7 @@ def test_sessions_of_lengths_and_of_drives_are_told(scene: Path, tmp_path: Path,
     assert truth["length_1_m"] - truth["drive_1_m"] == pytest.approx(extension, abs=2e-7)
 
 
-def test_a_load_that_no_twin_knows(scene: Path, healthy: Path, tmp_path: Path) -> None:
+def test_a_load_that_no_twin_knows(scene: Path, healthy: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
     loads = ["--load", "pump:0.5:400@0.5", "--load", "wind:20"]
     bag = made(scene, tmp_path / "shaken", *loads, "--rate", "500", "--fault", "tip.payload:more:5@1+0.5..2")
     notes = scan(bag).notes
@@ -99,9 +86,9 @@ def test_a_load_that_no_twin_knows(scene: Path, healthy: Path, tmp_path: Path) -
     truth = load_truth(bag)
     assert truth is not None and len(truth.times) == 1500
     assert truth.load[:, 1].max() == pytest.approx(400.0, abs=1.0) and np.abs(truth.load[:, 0]).max() > 1.0
-    still = load_truth(healthy)
+    still = load_truth(healthy[0])
     assert still is not None and not still.load.any()
-    assert replayed(scene, bag)["tip_load_rms_N"] > 2.0 * summary_of(healthy)["tip_load_rms_N"]
+    assert replayed(scene, bag)["tip_load_rms_N"] > 2.0 * healthy[1]["tip_load_rms_N"]
 
 
 def test_only_the_sensors_that_are_asked_for(scene: Path, tmp_path: Path) -> None:
@@ -109,7 +96,7 @@ def test_only_the_sensors_that_are_asked_for(scene: Path, tmp_path: Path) -> Non
     assert scan(bag).notes["wrong"] == "k, d, EI and masses off by 0.1, rig seed 3" and "faults" not in scan(bag).notes
     assert [topic.name for topic in scan(bag).topics] == ["/cylinder_forces", "/cylinder_strokes", "/joint_angles"]
     assert scan(bag).notes["forces"] == "noise 100 N, resolution 20 N"
-    rows = json.loads((replayed_folder(scene, bag) / "summary.json").read_text())
+    rows = replayed(scene, bag)
     assert rows["alarms"] == [] and rows["dropped"] == 0
     kept = read(scan(bag.with_name("forces_out") / "bag"), {"/boom_twin/residuals": "sensor_msgs/msg/JointState"})
     ratios = [msg.velocity[0] for _, _, msg in kept if msg.name == ["cylinder_force_1"]]
@@ -151,8 +138,11 @@ def test_no_recording_is_written_over(scene: Path, tmp_path: Path, capsys: pytes
 def test_further_sensors_are_recorded_with_the_mapping_that_places_them(scene: Path) -> None:
     more = ["--imu", "1:1.5:0.5236", "--point", "1:3.0", "--pressures", "0.12:0.07", "--sensors", "angles,imu,gyro"]
     bag = made(scene, scene.with_name("placed"), *more)
-    out = replayed_folder(scene, bag)
-    rows = [message for _, _, message in read(scan(out / "bag"), {"/boom_twin/residuals": "sensor_msgs/msg/JointState"})]
+    summary = replayed(scene, bag)
+    rows = [
+        message
+        for _, _, message in read(scan(Path(f"{bag}_out", "bag")), {"/boom_twin/residuals": "sensor_msgs/msg/JointState"})
+    ]
     groups: dict[tuple[str, ...], list[Any]] = {}
     for message in rows:
         groups.setdefault(tuple(message.name), []).append(message.velocity)
@@ -161,7 +151,7 @@ def test_further_sensors_are_recorded_with_the_mapping_that_places_them(scene: P
     assert len(groups["cylinder_force_1",]) == 600, "by pressures"
     for names, ratios in groups.items():
         assert np.sqrt(np.nanmean(np.square(ratios))) < 2.5, names
-    assert summary_of(bag)["alarms"] == []
+    assert summary["alarms"] == []
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,12 @@
-"""What `simulate` says of a drive that is likely meant otherwise, before it simulates it."""
+"""What `simulate` reads, writes and says: drives likely meant otherwise, lengths, worn pins."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command import main
+from command import answer, main
 from default_boom import strokes_of_posture
 
 from boom_twin import load_scene
@@ -18,9 +17,9 @@ TIMES = np.arange(0.0, 2.0, 0.01)
 STROKES = strokes_of_posture(load_scene(), "arch") + 0.01 * np.sin(np.pi * TIMES)[:, None]
 
 
-def drive_file(path: Path, times: np.ndarray, strokes: np.ndarray) -> str:
-    rows = "\n".join(",".join(map(repr, row)) for row in np.column_stack([times, strokes]).tolist())
-    path.write_text(f"{HEADER}{rows}\n", encoding="utf-8")
+def written(path: Path, times: np.ndarray, rows: np.ndarray, stem: str = "stroke") -> str:
+    names = ",".join(f"{stem}_{i + 1}_m" for i in range(rows.shape[1]))
+    np.savetxt(path, np.column_stack([times, rows]), fmt="%.12g", delimiter=",", header=f"t_s,{names}", comments="")
     return str(path)
 
 
@@ -42,10 +41,27 @@ def jumped(size: float) -> np.ndarray:
 def test_a_drive_likely_meant_otherwise_is_told_and_followed(
     times: np.ndarray, strokes: np.ndarray, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    drive = drive_file(tmp_path / "drive.csv", times, strokes)
+    drive = written(tmp_path / "drive.csv", times, strokes)
     given = ["--drive", drive, "--out", str(tmp_path / "out.csv"), "--no-error-estimate", "--dt", "0.01"]
     assert main(["simulate", *given]) == 0
     assert (f"warning: {drive}: {told}" if told else "") in (err := capsys.readouterr().err) and (told or "warning" not in err)
+
+
+def test_lost_contacts_of_worn_pins_are_told_and_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scene", "--clearance"]) == 0
+    scene, out = tmp_path / "play.yaml", tmp_path / "out.csv"
+    scene.write_text(capsys.readouterr().out)
+    drive = written(
+        tmp_path / "drive.csv", np.linspace(0.0, 0.05, 6), np.tile(strokes_of_posture(load_scene(), "arch"), (6, 1))
+    )
+    assert main(["simulate", str(scene), "--posture", "arch", "--drive", drive, "--out", str(out)]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[4:] == [*(f"cylinder_{i}.rod: contact lost 0 times" for i in range(1, 5)), str(out)]
+    found = columns(out)
+    names = [f"cylinder_{i}_rod_{what}" for i in range(1, 5) for what in ("dx_m", "dy_m", "force_N", "contact")]
+    assert [*found][-20:] == [*names, *(f"length_{i}_m" for i in range(1, 5))] and len(found["t_s"]) == 6
+    assert found["cylinder_1_rod_contact"][-1] == 1.0
+    assert np.hypot(found["cylinder_1_rod_dx_m"], found["cylinder_1_rod_dy_m"])[-1] > 1e-4
 
 
 def columns(path: Path) -> dict[str, np.ndarray]:
@@ -65,41 +81,31 @@ def test_results_of_another_boom_are_replaced_and_no_drive_is(tmp_path: Path, ca
         assert "is no earlier result of this command" in capsys.readouterr().err
 
 
-def written(path: Path, stem: str, rows: np.ndarray) -> str:
-    names = ",".join(f"{stem}_{i + 1}_m" for i in range(rows.shape[1]))
-    np.savetxt(
-        path, np.column_stack([TIMES[: len(rows)], rows]), fmt="%.12g", delimiter=",", header=f"t_s,{names}", comments=""
-    )
-    return str(path)
-
-
 def test_the_lengths_of_a_result_give_the_same_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """They are its last columns; under the names of a session they are lengths too."""
     out, again = tmp_path / "out.csv", tmp_path / "again.csv"
     command = ["simulate", "--posture", "arch", "--no-error-estimate"]
     drive = STROKES[0] + 0.01 * ease(TIMES[:120])[:, None]
-    assert main([*command, "--drive", written(tmp_path / "drive.csv", "stroke", drive), "--out", str(out)]) == 0
+    assert main([*command, "--drive", written(tmp_path / "drive.csv", TIMES[:120], drive), "--out", str(out)]) == 0
     moved = columns(out)
     lengths = [f"length_{i}_m" for i in range(1, 5)]
     assert list(moved)[-4:] == lengths and list(moved)[1] == "stroke_1_m"
-    session = written(tmp_path / "session.csv", "stroke", np.column_stack([moved[name] for name in lengths]))
+    session = written(tmp_path / "session.csv", TIMES[:120], np.column_stack([moved[name] for name in lengths]))
     for given in (str(out), session):
         assert main([*command, "--lengths", given, "--out", str(again)]) == 0
         for name, values in columns(again).items():
             off = {"_N": 200.0, "s2": 0.4}.get(name[-2:], 2e-5)  # rows of 10 ms, between which lengths are a cubic
             assert values == pytest.approx(moved[name], abs=off), name
-    written(tmp_path / "late.csv", "length", STROKES[:5])
     capsys.readouterr()
-    assert main([*command, "--lengths", str(tmp_path / "late.csv"), "--out", str(again)]) == 1
+    late = written(tmp_path / "late.csv", TIMES[:5], STROKES[:5], "length")
+    assert main([*command, "--lengths", late, "--out", str(again)]) == 1
     assert "in the first row at rest: posture arch has" in capsys.readouterr().err
 
 
 def test_statics_tells_lengths_beside_drives(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["statics", "--posture", "arch", "--json"]) == 0
-    at_drives = json.loads(capsys.readouterr().out)
+    at_drives = answer(capsys, "statics", "--posture", "arch")
     lengths = ",".join(map(repr, at_drives["length_m"]))
-    assert main(["statics", f"--lengths={lengths}", "--json"]) == 0
-    at_lengths = json.loads(capsys.readouterr().out)
+    at_lengths = answer(capsys, "statics", f"--lengths={lengths}")
     keys = ["stroke_m", "length_m", "tip_rigid_m", "tip_m", "joint_rad", "cylinder_force_N", "frequencies_Hz"]
     assert list(at_lengths) == list(at_drives) == keys
     for key in ("stroke_m", "length_m", "tip_m", "joint_rad", "frequencies_Hz"):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import closing
 from pathlib import Path
 
 import pytest
-from command import main
+from command import answer, main
 from default_boom import default_text
 
 from boom_twin.cli.replay import flat
@@ -43,8 +42,7 @@ def test_the_scene_is_one_option_and_a_positional_argument(tmp_path: Path, capsy
     scene.write_text(default_text().replace("postures:", "tip: {payload: 100.0}\npostures:", 1))
     told = []
     for arguments in (["--scene", str(scene)], [str(scene)], []):
-        assert main(["statics", *arguments, f"--strokes={STROKES}", "--json"]) == 0
-        told.append(json.loads(capsys.readouterr().out)["tip_m"])
+        told.append(answer(capsys, "statics", *arguments, f"--strokes={STROKES}")["tip_m"])
     assert told[0] == told[1] != told[2]
     assert "not allowed with argument" in refused(capsys, "statics", "--scene", "a", "b", f"--strokes={STROKES}")
 
@@ -52,11 +50,9 @@ def test_the_scene_is_one_option_and_a_positional_argument(tmp_path: Path, capsy
 @pytest.mark.parametrize("posture", ["-2,-160,-200,-210", "[-2, -160, -200, -210]", " -2., -160.0,-200,-210"])
 def test_section_angles_are_a_posture(posture: str, capsys: pytest.CaptureFixture[str]) -> None:
     """As `init` and `envelope` print them, also from a minus on."""
-    assert main(["statics", "--posture", posture.strip(), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    strokes = ",".join(map(str, found["stroke_m"]))
-    assert main(["statics", "--strokes", strokes, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["tip_m"] == pytest.approx(found["tip_m"], abs=1e-9)
+    found = answer(capsys, "statics", "--posture", posture.strip())
+    again = answer(capsys, "statics", "--strokes", ",".join(map(str, found["stroke_m"])))
+    assert again["tip_m"] == pytest.approx(found["tip_m"], abs=1e-9)
     assert main(["response", "--posture", posture.strip(), "--tip", "-100,0", "--json"]) == 0
 
 

@@ -28,28 +28,20 @@ SECOND = 10**9
 PATIENCE = 240.0
 
 
-def parsed(text: str) -> dict[str, dict[tuple[tuple[str, str], ...], float]]:
-    """Values of all metrics by name and labels, as the client library of Prometheus reads them."""
-    from prometheus_client import parser
-
-    found: dict[str, dict[tuple[tuple[str, str], ...], float]] = {}
-    for family in parser.text_string_to_metric_families(text):
-        for sample in family.samples:
-            found.setdefault(sample.name, {})[tuple(sorted(sample.labels.items()))] = sample.value
-    return found
-
-
 def scraped(feed: Feed) -> dict[str, dict[tuple[tuple[str, str], ...], float]]:
-    pytest.importorskip("prometheus_client", reason="pip install .[monitor]")
-    texts: list[str] = []
+    """Values of all metrics by name and labels, as the client library of Prometheus reads them."""
+    parser = pytest.importorskip("prometheus_client.parser", reason="pip install .[monitor]")
+    found: dict[str, dict[tuple[tuple[str, str], ...], float]] = {}
 
     async def talk(session: ClientSession, url: str) -> None:
         response = await session.get(f"{url}metrics")
         assert response.status == 200 and response.headers["Content-Type"].startswith("text/plain; version=")
-        texts.append(await response.text())
+        for family in parser.text_string_to_metric_families(await response.text()):
+            for sample in family.samples:
+                found.setdefault(sample.name, {})[tuple(sorted(sample.labels.items()))] = sample.value
 
     serve(feed, talk)
-    return parsed(texts[0])
+    return found
 
 
 def label(boom: str = "", **more: str) -> tuple[tuple[str, str], ...]:

@@ -8,6 +8,7 @@ import tracemalloc
 from collections.abc import Callable
 from functools import partial
 from math import inf, nan
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -55,18 +56,17 @@ def shape(points: int = 5, cylinders: int = 4, x: float = 1.0) -> Any:
     return message
 
 
+VECTORS: dict[Role, str] = {
+    Output.TIP_DISPLACEMENT: "vector", Output.TIP_POSITION: "point", Output.TIP_ACCELERATION: "accel.linear",
+    Output.TIP_UNCERTAINTY: "vector", Output.ESTIMATE_POSE: "pose.pose.position", Output.ESTIMATE_LOAD: "wrench.force",
+    Output.ESTIMATE_ACCELERATION: "accel.accel.linear", Stream.IMU: "linear_acceleration",
+}  # fmt: skip
+UNCERTAIN: dict[Role, float] = {Output.ESTIMATE_POSE: 1e-6, Output.ESTIMATE_ACCELERATION: 0.01}
+
+
 def vector(role: Role, x: float = 0.5) -> Any:
     message = new_message(TYPES[role])
-    {
-        Output.TIP_DISPLACEMENT: lambda: message.vector,
-        Output.TIP_UNCERTAINTY: lambda: message.vector,
-        Output.TIP_POSITION: lambda: message.point,
-        Output.TIP_ACCELERATION: lambda: message.accel.linear,
-        Output.ESTIMATE_POSE: lambda: message.pose.pose.position,
-        Output.ESTIMATE_ACCELERATION: lambda: message.accel.accel.linear,
-        Output.ESTIMATE_LOAD: lambda: message.wrench.force,
-        Stream.IMU: lambda: message.linear_acceleration,
-    }[role]().x = x
+    attrgetter(VECTORS[role])(message).x = x
     return message
 
 
@@ -106,12 +106,8 @@ def event(text: str = "mark") -> Any:
 
 
 GOOD: dict[Role, Callable[[], Any]] = {
-    **{role: partial(vector, role) for role in (Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.TIP_ACCELERATION)},
-    Output.TIP_UNCERTAINTY: partial(vector, Output.TIP_UNCERTAINTY),
-    Output.ESTIMATE_POSE: partial(uncertain, Output.ESTIMATE_POSE, 1e-6),
-    Output.ESTIMATE_ACCELERATION: partial(uncertain, Output.ESTIMATE_ACCELERATION, 0.01),
-    Output.ESTIMATE_LOAD: partial(vector, Output.ESTIMATE_LOAD),
-    Stream.IMU: partial(vector, Stream.IMU),
+    **{role: partial(vector, role) for role in VECTORS if role not in UNCERTAIN},
+    **{role: partial(uncertain, role, variance) for role, variance in UNCERTAIN.items()},
     Output.JOINT_STATES: lambda: joint_state(JOINTS + CYLINDERS),
     Output.RESIDUALS: lambda: joint_state(JOINTS),
     Output.SHAPE: shape,

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
-from command import main
+from command import answer, main
 
 from boom_twin.report.quantities import ComparedSession, Quantity, rows_of
 
@@ -32,8 +31,7 @@ def test_what_is_no_chance_and_what_nobody_can_say() -> None:
 def test_a_session_and_a_replay_of_it_are_the_same(
     sessions: tuple[Path, Path], replays: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["compare", str(sessions[0]), str(replays[0]), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = answer(capsys, "compare", str(sessions[0]), str(replays[0]))
     assert found["same_scene"] and set(found["difference"]) == {0.0} and True not in found["is_significant"]
 
 

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from command import main
+from command import answer, main
 from default_boom import strokes_of_posture, with_parameters
 
 from boom_twin import Twin, load_scene, simulate, statics
@@ -98,10 +98,8 @@ def test_modes_of_a_boom_in_wind_are_those_of_its_model(tmp_path: Path, capsys: 
     assert (
         main(["rig", "--out", str(session), "--through", "arch", "--duration", "100", "--load", "wind:60:0.5", "--quiet"]) == 0
     )
-    assert main(["statics", "--posture", "arch", "--json"]) == 0
-    natural = json.loads(capsys.readouterr().out.splitlines()[-1])["frequencies_Hz"]
-    assert main(["modal", str(session), "--out", str(out), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    natural = answer(capsys, "statics", "--posture", "arch")["frequencies_Hz"]
+    found = answer(capsys, "modal", str(session), "--out", str(out))
     assert len(found["frequency_Hz"]) >= 3
     for frequency, sigma, model in zip(found["frequency_Hz"][:3], found["frequency_sigma_Hz"], natural, strict=False):
         assert sigma < 0.02 * model and abs(frequency - model) < 3.0 * sigma + 0.01 * model

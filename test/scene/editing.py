@@ -44,10 +44,6 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.path = folder / "scene.yaml"
 
-    def values(self) -> Values:
-        """Return a copy of the default scene's values."""
-        return copy.deepcopy(DEFAULT)
-
     def write(self, values: Any) -> Path:
         """Write a scene file of these values."""
         stream = io.StringIO()
@@ -61,7 +57,7 @@ class Bench:
 
     def edited(self, edit: Edit) -> Path:
         """Write the default scene after an edit."""
-        values = self.values()
+        values = copy.deepcopy(DEFAULT)
         edit(values)
         return self.write(values)
 

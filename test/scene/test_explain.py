@@ -16,10 +16,6 @@ def account(bench: Any, **edits: Any) -> Account:
     return explain(load_scene(bench.edited(lambda values: values.update(edits))))
 
 
-def left_out(found: Account) -> dict[str, str]:
-    return {item.key: item.meaning for item in found.left_out}
-
-
 def test_masses_and_strokes_of_the_default_scene(bench: Any) -> None:
     found = account(bench)
     beams = [52 * 3.0, 41 * 2.8, 33 * 2.7, 26 * 2.85]
@@ -28,7 +24,7 @@ def test_masses_and_strokes_of_the_default_scene(bench: Any) -> None:
     assert [section.section.beam_mass for section in found.sections] == pytest.approx(beams)
     assert [joint.joint.mass for joint in found.joints] == pytest.approx(drives)
     assert found.mass == pytest.approx(sum(beams) + sum(roots) + sum(heads) + sum(drives))
-    assert list(left_out(found)) == ["tip.payload", "line_fill", "base.inclination", "base.stiffness", "clearance"]
+    assert list(found.left_out) == ["tip.payload", "line_fill", "base.inclination", "base.stiffness", "clearance"]
     for joint in found.joints:
         assert (
             0 <= joint.stroke_low < 0.02
@@ -36,7 +32,7 @@ def test_masses_and_strokes_of_the_default_scene(bench: Any) -> None:
         )
     loaded = account(bench, line_fill=10.0, tip={"payload": 40.0})
     assert loaded.mass == pytest.approx(found.mass + 134.6 + 40.0)
-    assert list(left_out(loaded)) == ["base.inclination", "base.stiffness", "clearance"]
+    assert list(loaded.left_out) == ["base.inclination", "base.stiffness", "clearance"]
 
 
 def test_what_is_not_named_is_listed(bench: Any) -> None:
@@ -47,7 +43,7 @@ def test_what_is_not_named_is_listed(bench: Any) -> None:
         for path in (*gone, "joints[2].cylinder.d", "joints[3].cylinder.k", "joints[3].cylinder.d"):
             put(values, path, GONE)
 
-    told = left_out(explain(load_scene(bench.edited(edit))))
+    told = explain(load_scene(bench.edited(edit))).left_out
     words = {
         "sections[3].beam": "rigid, all of it described by root", "sections[2].modes": "keeps its mass",
         "sections[0, 1].beta": "damping", "joints[*].cylinder.barrel": "massless", "joints[1].mL": "massless",

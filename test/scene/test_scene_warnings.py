@@ -123,7 +123,7 @@ def test_a_range_that_ends_next_to_a_dead_centre_warns_and_the_suggested_one_kee
     assert oddity.path == f"joints[{i}].range_deg" and all(word in oddity.bound for word in words), str(oddity)
     low = first_number(oddity.remedy)
     assert low > whole[0] and bench.oddities(lambda values: edit(values, [low, whole[1]])) == []
-    found = explain(load_scene(bench.edited(lambda values: edit(values, [low, whole[1]])))).joints[i].linkage
+    found = explain(load_scene(bench.edited(lambda values: edit(values, [low, whole[1]])))).joints[i]
     assert found.lever[0] >= 0.25 * found.lever[1] and (found.transmission_deg is None or found.transmission_deg >= 5.0)
 
 

@@ -105,42 +105,24 @@ def recording(folder: Path) -> None:
     (folder / "session_0.mcap").write_bytes(b"a recording")
 
 
-def old_result(folder: Path) -> None:
-    """As version 0.1.0 wrote it."""
-    recording(folder / "bag")
-    (folder / "summary.json").write_text("{}")
-
-
-def forged(folder: Path) -> None:
-    """A recording with a manifest that calls it a replay's."""
+def listed(folder: Path, files: dict[str, str]) -> None:
+    """A recording with the manifest of a replay that lists these files."""
     recording(folder)
-    listed = {"session_0.mcap": hashlib.sha256(b"a recording").hexdigest()}
-    (folder / "manifest.json").write_text(json.dumps({"command": "replay", "files": listed}))
+    (folder / "manifest.json").write_text(json.dumps({"command": "replay", "files": files}))
 
 
-def changed(folder: Path) -> None:
-    build(folder)
-    (folder / "summary.json").write_text("{} ")
-
-
-def listed_only(folder: Path) -> None:
-    """A manifest that speaks of files elsewhere, and not of the one that is there."""
-    recording(folder)
-    listed = {"../precious": "", "session_0.mcap": "00"}
-    (folder / "manifest.json").write_text(json.dumps({"command": "replay", "files": listed}))
-
-
+DIGEST = hashlib.sha256(b"a recording").hexdigest()
 FOREIGN: dict[str, Callable[[Path], Any]] = {
     "a recording": recording,
     "a recording in bag": lambda folder: recording(folder / "bag"),
-    "a result of 0.1.0": old_result,
+    "a result of 0.1.0": lambda folder: (recording(folder / "bag"), (folder / "summary.json").write_text("{}")),
     "an empty folder inside": lambda folder: (folder / "notes").mkdir(parents=True),
     "a hidden file": lambda folder: (build(folder), (folder / ".hidden").write_text("")),
     "a link": lambda folder: (build(folder), (folder / "link").symlink_to("/")),
-    "a result that was edited": changed,
+    "a result that was edited": lambda folder: (build(folder), (folder / "summary.json").write_text("{} ")),
     "another command's": lambda folder: build(folder, RIG, name="session_0.mcap"),
-    "a manifest that lies": listed_only,
-    "a manifest that was forged": forged,
+    "a manifest that lies": lambda folder: listed(folder, {"../precious": "", "session_0.mcap": "00"}),
+    "a manifest that was forged": lambda folder: listed(folder, {"session_0.mcap": DIGEST}),
     "a manifest of another shape": lambda folder: (folder.mkdir(), (folder / "manifest.json").write_text("[[]]")),
 }
 

@@ -24,13 +24,7 @@ class Feed:
     """
 
     def __init__(
-        self,
-        title: str,
-        store: Store,
-        topics: Topics,
-        scene: Scene | None = None,
-        end: float | None = None,
-        boom: str = "",
+        self, title: str, store: Store, topics: Topics, scene: Scene | None = None, end: float | None = None, boom: str = ""
     ) -> None:
         self.title, self.store, self.end, self.boom = title, store, end, boom.strip("/")
         self.topic_rows = TopicRows(store, topics)

@@ -227,12 +227,10 @@ class AlarmList:
 
     def _fold(self, channel: str) -> None:
         """Take the alarms of lamps about a channel out, because health tells of it: one fault is one alarm."""
-        same = {
-            key: alarm for key, alarm in self._open.items() if alarm.name in [f"{kind} {channel}" for kind in SENSOR_GROUPS]
-        }
-        for key, alarm in same.items():
-            del self._open[key]
-            self.all = [each for each in self.all if each is not alarm]
+        names = [f"{kind} {channel}" for kind in SENSOR_GROUPS]
+        for key in [key for key, alarm in self._open.items() if alarm.name in names]:
+            gone = self._open.pop(key)
+            self.all = [each for each in self.all if each is not gone]
 
     def active(self, time: float) -> list[ListedAlarm]:
         """Return the health alarms that were active at `time` (s), the gravest first."""

@@ -11,8 +11,7 @@ from ...config.yaml_text import Document, Place
 from ...errors import Fault
 from ..schema import Scene
 
-Findings = Iterator[Fault]
-"""Faults and warnings, as a check yields them."""
+Findings = Iterator[Fault]  # faults and warnings, as a check yields them
 
 
 @dataclass(frozen=True)

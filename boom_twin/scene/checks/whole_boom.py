@@ -146,23 +146,15 @@ CELLS = 12  # of a beam
 class StraightBoom:
     """A stretched-out boom of n sections with k modes."""
 
-    frequencies: Array
-    """Natural frequencies, Hz, ascending, at most n + 2 of them, shape (k,)."""
-    levers: Array
-    """Change of stroke by angle, m/rad, shape (n,)."""
-    moments: Array
-    """Moments about the pivots of the weight of all that lies outboard, N m, shape (n,)."""
-    mass: float
-    """Mass of all that moves, kg."""
+    frequencies: Array  # natural frequencies, Hz, ascending, at most n + 2 of them, shape (k,)
+    levers: Array  # change of stroke by angle, m/rad, shape (n,)
+    moments: Array  # about the pivots, of the weight of all that lies outboard, N m, shape (n,)
+    mass: float  # of all that moves, kg
 
 
+@np.errstate(all="ignore")  # of absurd values
 def straight_boom(scene: Scene, stiffnesses: Array) -> StraightBoom:
     """Estimate the stretched-out boom; `stiffnesses` (n,) of the oil springs in N/m, infinite where there is none."""
-    with np.errstate(all="ignore"):  # of absurd values
-        return _estimate(scene, stiffnesses)
-
-
-def _estimate(scene: Scene, stiffnesses: Array) -> StraightBoom:
     starts = np.concatenate([[0.0], np.cumsum([section.length for section in scene.sections])])
     angles = [np.clip(0.0, *np.radians(joint.range_deg)) for joint in scene.joints]
     levers = np.nan_to_num([float(cylinder_length(linkage(scene, i), angle)[1]) for i, angle in enumerate(angles)])
