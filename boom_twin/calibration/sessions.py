@@ -145,14 +145,11 @@ def channel_names(joints: int) -> tuple[str, ...]:
 
 
 def rest_periods(
-    session: MeasuredSession,
-    scene: Scene,
-    rigging: Rigging,
-    until: int | None = None,
+    session: MeasuredSession, scene: Scene, rigging: Rigging, until: int | None = None, needed: float = RESTED
 ) -> list[RestPeriod]:
     """Return the rest periods of a session up to the stamp `until` (ns).
 
-    BagError if it rests too little, SolverError if the boom has no equilibrium at its strokes.
+    BagError if they last less than `needed` (s) in all, SolverError if the boom has no equilibrium at its strokes.
     """
     boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads, rigging.places)
     strokes = session.series[Stream.STROKES]
@@ -160,10 +157,10 @@ def rest_periods(
         strokes = strokes.of(0, until)
     found = [_period(session, *span) for part in _without_gaps(strokes) for span in _rests(boom, part)]
     rested = sum(float(period.times[-1]) for period in found)
-    if rested < RESTED:
+    if rested < needed:
         raise BagError(
             f"{session.name}: the boom rests for {rested:.1f} s in the part that is fitted, in periods of {SHORTEST:g} s or "
-            f"more; {RESTED:g} s are needed. Record a minute of moves with rests of 3 s and more between them."
+            f"more; {needed:g} s are needed. Record a minute of moves with rests of 3 s and more between them."
         )
     return found
 

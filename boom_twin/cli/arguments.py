@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from argparse import REMAINDER, SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
 from math import inf, isfinite
@@ -24,14 +25,14 @@ def add_scene(parser: ArgumentParser) -> None:
     """Declare the scene file, as ``--scene`` or as a positional argument; without it, the default scene."""
     either = parser.add_mutually_exclusive_group()
     either.add_argument("--scene", metavar="SCENE", help="scene file (YAML); without it, the default scene")
-    either.add_argument("scene", nargs="?", default=SUPPRESS, metavar="SCENE", help="the same, without --scene before it")
+    either.add_argument("scene", nargs="?", default=SUPPRESS, metavar="SCENE", help="scene file, as with --scene")
 
 
 def add_place(parser: ArgumentParser) -> Any:
     """Declare ``--posture``, ``--strokes`` and ``--lengths``, of which one is needed; return their group."""
     where = parser.add_mutually_exclusive_group(required=True)
-    where.add_argument("--posture", metavar="P", help="a posture of the scene, or section angles, deg: 60,-20,-30")
-    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes of the drives, m")
+    where.add_argument("--posture", metavar="P", help="posture, or section angles to the horizontal, deg: 60,-20,-30")
+    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="strokes of the drives (oil unloaded), m")
     read = "cylinder lengths less closed_length, m: what stroke transducers read of the boom at rest"
     where.add_argument("--lengths", type=numbers, metavar="L1,..,LN", help=read)
     return where
@@ -46,13 +47,13 @@ def add_session(parser: ArgumentParser, params: bool = True, mapping: bool = Tru
     """Declare the options by which a recorded session is read: scene, parameters, mapping, window."""
     parser.add_argument("--scene", metavar="SCENE", help=scene)
     if params:
-        add_file(parser, "--params", "ROS parameter file (as recorded, else the package's twin.yaml)")
+        add_file(parser, "--params", "ROS parameter file (default: as recorded, else the package's twin.yaml)")
     if mapping:
-        purpose = "topics and sensors; by default as the session was recorded, else what `boom_twin mapping` prints"
+        purpose = "mapping of topics and sensors (default: as recorded, else what `boom_twin mapping` prints)"
         add_file(parser, "--mapping", purpose)
-    begin = "begin so many seconds after the first sample (0); the model then starts at rest there"
+    begin = "begin S seconds after the first sample (default 0); the model starts at rest there"
     parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help=begin)
-    parser.add_argument("--duration", type=positive, metavar="S", help="read so many seconds (all)")
+    parser.add_argument("--duration", type=positive, metavar="S", help="read S seconds (default: all)")
 
 
 def window_of(args: Namespace) -> TimeWindow:
@@ -64,7 +65,7 @@ def window_of(args: Namespace) -> TimeWindow:
 
 def add_json(parser: ArgumentParser) -> None:
     """Declare ``--json``: stdout holds exactly one flat JSON object."""
-    parser.add_argument("--json", action="store_true", help="print one flat JSON object on stdout, nothing else there")
+    parser.add_argument("--json", action="store_true", help="print exactly one flat JSON object on stdout")
 
 
 def add_ros_args(parser: ArgumentParser) -> None:
@@ -76,7 +77,13 @@ def add_ros_args(parser: ArgumentParser) -> None:
 
 def add_namespace(parser: ArgumentParser, purpose: str) -> None:
     """Declare ``--namespace``."""
-    parser.add_argument("--namespace", metavar="NAME", default="", help=purpose)
+    parser.add_argument("--namespace", type=_namespace, metavar="NAME", default="", help=purpose)
+
+
+def _namespace(text: str) -> str:
+    if not re.fullmatch(r"/?([A-Za-z_]\w*(/[A-Za-z_]\w*)*)?/?", text, re.ASCII):
+        raise ArgumentTypeError(f"'{text}': each part must begin with a letter or _, then letters, digits and _; like front")
+    return text
 
 
 def ros_arguments(args: Namespace) -> list[str]:

@@ -22,14 +22,10 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     sources = "sessions, globs (quote them), or files *.txt that list these, one a line"
     parser.add_argument("bags", nargs="+", metavar="BAG", help=sources)
-    place = "folder for sessions.parquet, batch.html and the replays: new, empty, or of an earlier batch, which goes on"
+    place = "folder for tables and replays: new, empty, or of an earlier batch, which is continued"
     parser.add_argument("--out", required=True, metavar="DIR", type=Path, help=place)
-    parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a running Dask scheduler; without it, sessions run on this machine"
-    )
-    parser.add_argument(
-        "--workers", metavar="N", type=at_least(1), help="sessions at once on this machine; by default as many as cores"
-    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="running Dask scheduler (default: this machine)")
+    parser.add_argument("--workers", metavar="N", type=at_least(1), help="sessions at a time (default: one per core)")
     scene = "scene file (YAML) for all sessions; without it, the one that each was made with, else the default scene"
     add_session(parser, scene=scene)
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
@@ -37,10 +33,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     fatigue = "damage of all stations, summed up by rig: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
     parser.add_argument("--fatigue", nargs="?", type=positive, const=71.0, metavar="CATEGORY", help=fatigue)
     parser.add_argument("--keep-bags", action="store_true", help="keep the result bag of every session")
-    parser.add_argument("--timeout", metavar="S", type=positive, default=3600.0, help="for one session, s (3600)")
-    parser.add_argument("--memory", metavar="MB", type=positive, default=2000.0, help="for one session, MB (2000)")
-    parser.add_argument("--retries", metavar="N", type=at_least(0), default=1, help="of a session that fails (1)")
-    parser.add_argument("--retry-failed", action="store_true", help="go on with those too that failed in an earlier call")
+    parser.add_argument("--timeout", metavar="S", type=positive, default=3600.0, help="limit for a session, s (default 3600)")
+    parser.add_argument("--memory", metavar="MB", type=positive, default=2000.0, help="limit for a session, MB (default 2000)")
+    parser.add_argument("--retries", metavar="N", type=at_least(0), default=1, help="attempts after a failure (default 1)")
+    parser.add_argument("--retry-failed", action="store_true", help="also repeat sessions that failed earlier")
 
 
 def run(args: Namespace) -> int:

@@ -19,19 +19,17 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("bags", nargs="+", metavar="BAG", help="healthy sessions, begun at rest; the last one is held out")
-    parser.add_argument("--out", type=Path, metavar="SCENE", required=True, help="the new scene; zeros: a mapping beside it")
-    parser.add_argument("--parameters", metavar="A,B,..", help="just these, as cylinder_1.k,joint_2.zero; else those below")
-    parser.add_argument("--load", choices=("payload", "line_fill"), help="besides k of cylinders and zeros of sensors: a load")
-    parser.add_argument("--damping", choices=("d", "beta"), help="besides: damping of cylinders, or of sections")
-    parser.add_argument(
-        "--stiffness", action="store_true", help="besides: bending stiffness EI of sections, stiffness of the base"
-    )
-    whose = "zeros of all sensors (default), of all but the stroke transducers, or none"
+    parser.add_argument("bags", nargs="+", metavar="BAG", help="healthy sessions that begin at rest; the last one is held out")
+    parser.add_argument("--out", type=Path, metavar="SCENE", required=True, help="scene to write; zeros: a mapping beside it")
+    parser.add_argument("--parameters", metavar="A,B,..", help="estimate only these: cylinder_1.k,joint_2.zero")
+    parser.add_argument("--load", choices=("payload", "line_fill"), help="also estimate a load")
+    parser.add_argument("--damping", choices=("d", "beta"), help="also estimate damping of cylinders or sections")
+    parser.add_argument("--stiffness", action="store_true", help="also estimate EI and an elastic base")
+    whose = "estimate the zeros of all sensors (default), of all but the stroke transducers, or none"
     parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
     add_session(parser)
-    parser.add_argument("--date", metavar="DATE", help="for the provenance; today if not given")
-    parser.add_argument("--force", action="store_true", help="replace files of the result that are there already")
+    parser.add_argument("--date", metavar="DATE", help="date of the provenance (default: today)")
+    parser.add_argument("--force", action="store_true", help="overwrite existing results")
     add_json(parser)
 
 

@@ -31,7 +31,7 @@ PNG = b"\x89PNG"  # first bytes of a picture; only such a file is replaced
 def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser)
     add_json(parser)
-    parser.add_argument("--strict", action="store_true", help="warnings are errors: the exit code is 1 if there are any")
+    parser.add_argument("--strict", action="store_true", help="treat warnings as errors: exit code 1 if there are any")
     add_file(parser, "--picture", "PNG file to draw: all pins, links and cylinders over the range of each joint")
     need.add_arguments(parser)
     parser.add_argument(

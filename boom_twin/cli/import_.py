@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="CSV, .parquet, .tdms, .mf4, each at its own rate")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="CSV, .parquet, .tdms, .mf4; each keeps its rate")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the session, new or empty")
-    parser.add_argument("--scene", metavar="SCENE", help="scene file (YAML), which the session keeps")
+    parser.add_argument("--scene", metavar="SCENE", help="scene file (YAML) to keep in the session")
     add_file(parser, "--columns", "which column is which channel and the time, as --propose prints it; names tell the rest")
     given = "a column of a channel, as cylinder_1=Lift:mm; may be repeated"
     parser.add_argument("--column", action="append", default=[], metavar="CHANNEL=NAME[:UNIT]", help=given)
     add_file(parser, "--mapping", "signs, zeros, mounts and units of the rig's sensors, which the session keeps")
-    parser.add_argument("--timezone", metavar="ZONE", help="of local times in the files, as Europe/Berlin (UTC)")
-    parser.add_argument("--note", metavar="TEXT", help="is kept in the session")
-    parser.add_argument("--propose", action="store_true", help="print a file for --columns with what is recognised")
+    parser.add_argument("--timezone", metavar="ZONE", help="zone of local times: Europe/Berlin (default UTC)")
+    parser.add_argument("--note", metavar="TEXT", help="note, kept in the session")
+    parser.add_argument("--propose", action="store_true", help="print recognised columns as a file for --columns")
     add_json(parser)
 
 

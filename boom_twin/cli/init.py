@@ -16,11 +16,11 @@ from .output import tell_oddities
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("--table", metavar="FILE", type=Path, help="dimensions in YAML")
-    parser.add_argument("--force", action="store_true", help="replace a scene that is there, after the table was mended")
+    parser.add_argument("--table", metavar="FILE", type=Path, help="table of dimensions, as --example-table prints it")
+    parser.add_argument("--force", action="store_true", help="overwrite an existing scene")
     what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--out", metavar="SCENE", type=Path, help="scene file to write; one that is there is left alone")
-    what.add_argument("--example-table", action="store_true", help="print a table to start from, and do no more")
+    what.add_argument("--out", metavar="SCENE", type=Path, help="scene file to write; without --force it must not exist")
+    what.add_argument("--example-table", action="store_true", help="print a table to start from, and exit")
 
 
 def run(args: Namespace) -> int:

@@ -30,29 +30,29 @@ from .output import QuietStream
 use_one_blas_thread()
 
 COMMANDS: dict[str, str] = {
-    "check": "validate a scene and tell what its model consists of",
+    "check": "validate a scene and list what its model contains",
     "init": "write a first scene from the dimensions of a drawing",
-    "import": "loggers' CSV, Parquet, TDMS, MDF as a session",
-    "info": "what a recorded session holds and what it lacks",
-    "monitor": "the live page, of the topics or of a recorded session",
+    "import": "convert loggers' CSV, Parquet, TDMS, MDF to a session",
+    "info": "list what a recorded session holds and what it lacks",
+    "monitor": "serve the live page, of the topics or of a recorded session",
     "play": "publish a recorded session over ROS 2",
     "record": "record the session topics from ROS 2",
-    "recover": "save what is whole of a damaged session",
+    "recover": "save the sound part of a damaged session",
     "scene": "print the default scene file",
-    "mapping": "print the default mapping of topics and sensors",
+    "mapping": "print the default mapping of topics and sensors, or check the wiring of a session",
     "urdf": "print a scene as a URDF, for robot_state_publisher",
-    "views": "RViz, Foxglove, PlotJuggler: files for a named boom",
-    "statics": "static equilibrium, cylinder forces, natural frequencies",
-    "envelope": "sag, forces, frequencies, stresses over the whole range",
-    "simulate": "the boom's answer to a stroke history",
-    "response": "frequency response, steady states, pump rates to avoid",
-    "replay": "a recorded session through the twin",
-    "calibrate": "parameters of a scene from healthy sessions",
-    "modal": "measured natural frequencies and damping, stabilisation diagram (extra modal)",
-    "batch": "many recorded sessions through the twin, one table (extra batch)",
-    "compare": "two recorded sessions side by side",
-    "warm": "compile the kernels beforehand, for an image; remove them",
-    "study": "reports on the methods: error against run time",
+    "views": "write files for RViz, Foxglove and PlotJuggler, for a boom in a namespace",
+    "statics": "compute static equilibrium, cylinder forces, natural frequencies",
+    "envelope": "find the extremes of sag, forces, frequencies, stresses over the working range",
+    "simulate": "simulate the motion of the boom under a stroke history",
+    "response": "compute frequency response, steady states, pump rates to avoid",
+    "replay": "run a recorded session through the twin",
+    "calibrate": "estimate parameters of a scene from healthy sessions",
+    "modal": "measure natural frequencies and damping in rest periods (extra modal)",
+    "batch": "run many recorded sessions through the twin, into one table (extra batch)",
+    "compare": "compare two recorded sessions side by side",
+    "warm": "compile the kernels beforehand, as for an image; or remove them",
+    "study": "report on the methods: error against run time, stability, cost of parts",
     "rig": "make a synthetic session on the virtual rig (extra peers)",
 }
 """Purpose of each command, the module of that name in `boom_twin.cli`.
@@ -73,7 +73,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "record": ('record --out bags/today --note "wind 5 m/s"',),
     "recover": ("recover bags/broken --out out/saved",),
     "scene": ("scene", "scene --clearance"),
-    "mapping": ("mapping",),
+    "mapping": ("mapping > rig.yaml", "mapping --check bags/arch_session --out mended.yaml"),
     "views": ("views --namespace front --out out/views",),
     "urdf": ("urdf my_boom.yaml",),
     "statics": ("statics my_boom.yaml --posture arch", "statics --strokes=0.63,0.165,0.235,0.187 --json"),
@@ -200,7 +200,7 @@ def _parser(arguments: Sequence[str]) -> ArgumentParser:
         about = purpose[0].upper() + purpose[1:] + "."
         examples = [f"  boom_twin {example}" for example in EXAMPLES.get(name, ())]
         own = commands.add_parser(name, description=about, epilog="\n".join(["examples:", *examples] if examples else []))
-        own.add_argument("--quiet", action="store_true", help="leave out what is told on the way, but for warnings")
+        own.add_argument("--quiet", action="store_true", help="print results, warnings and errors only")
         if is_completing or name in arguments:
             _command(name).add_arguments(own)
     if is_completing:

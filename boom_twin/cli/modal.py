@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("bag", metavar="BAG", help="a recorded session with a rest period of 20 s or more, better two minutes")
+    parser.add_argument("bag", metavar="BAG", help="session with rest of at least 20 s, better 2 minutes")
     parser.add_argument(
         "--out", required=True, metavar="DIR", help="folder for modes.json and stabilisation diagrams, new or empty"
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from argparse import SUPPRESS, ArgumentParser, Namespace
+from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from importlib.util import find_spec
@@ -21,19 +21,26 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("--bag", metavar="BAG", type=Path, help="a recorded session, or the bag of a replay (the live topics)")
+    told = "show this recorded session, or the bag of a replay (default: the live topics)"
+    parser.add_argument("--bag", metavar="BAG", type=Path, help=told)
     add_session(parser)
-    parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
-    parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
-    token = "the token is the one in FILE, on this machine, too; without it, a new one at each start"
+    parser.add_argument("--port", type=_port, help=f"TCP port (default {PORT}, or a free one if that is taken; 0: a free one)")
+    parser.add_argument("--host", default="127.0.0.1", help="listen here (default 127.0.0.1); elsewhere viewers need a token")
+    token = "file that holds the token, asked for on this machine too (default: a new token at each start)"
     parser.add_argument("--token-file", metavar="FILE", type=Path, help=token)
     parser.add_argument(
-        "--webhook", metavar="URL", help="post a JSON object here when an alarm begins, changes its cause, or ends"
+        "--webhook", metavar="URL", help="post a JSON object to URL when an alarm begins, changes its cause, or ends"
     )
-    allow = "what viewers may do: mark events, acknowledge alarms (both)"
+    allow = "actions that viewers may take: mark, acknowledge (default: both; without names: none)"
     parser.add_argument("--allow", nargs="*", choices=ACTS, default=ACTS, metavar="ACT", help=allow)
     parser.add_argument("--until-stdin-ends", action="store_true", help=SUPPRESS)  # it ends with the node that started it
     add_ros_args(parser)
+
+
+def _port(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and int(text) < 65536):
+        raise ArgumentTypeError(f"{text}: must be a whole number from 0 to 65535")
+    return int(text)
 
 
 def run(args: Namespace) -> int:

@@ -27,23 +27,23 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("bag", metavar="BAG", type=Path, help="rosbag2 directory, or a file: .mcap, .db3, .bag of ROS 1, .csv")
-    parser.add_argument("--rate", type=positive, default=1.0, metavar="R", help="session time over real time (1)")
-    parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help="begin so many seconds in (0)")
-    parser.add_argument("--duration", type=positive, metavar="S", help="seconds of the session to play (all)")
-    parser.add_argument("--loop", action="store_true", help="again and again, until Ctrl-C")
-    parser.add_argument("--topics", nargs="+", metavar="NAME", help="these topics of the session (the twin's inputs)")
+    parser.add_argument("--rate", type=positive, default=1.0, metavar="R", help="session over real time (default 1)")
+    parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help="begin after S seconds (default 0)")
+    parser.add_argument("--duration", type=positive, metavar="S", help="play S seconds (default: all)")
+    parser.add_argument("--loop", action="store_true", help="repeat until Ctrl-C")
+    parser.add_argument("--topics", nargs="+", metavar="NAME", help="topics to play (default: inputs of the twin)")
     parser.add_argument(
         "--clock",
         nargs="?",
         type=positive,
         const=40.0,
         metavar="HZ",
-        help="publish the log times on /clock too, so many times in a second (40)",
+        help="also publish the log times on /clock, HZ times a second (without a value 40)",
     )
     parser.add_argument(
-        "--wait", type=not_negative, default=10.0, metavar="S", help="wait so long for listeners (10; 0: do not)"
+        "--wait", type=not_negative, default=10.0, metavar="S", help="wait S seconds for listeners (default 10; 0: do not)"
     )
-    purpose = "listeners to every topic to wait for: 2 where node and recorder listen (1)"
+    purpose = "listeners of every topic to wait for: 2 for node and recorder (default 1)"
     parser.add_argument("--listeners", type=int, choices=range(1, 100), default=1, metavar="N", help=purpose)
     add_ros_args(parser)
 

@@ -32,23 +32,23 @@ _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="directory of the bag, new or empty")
+    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the session, new or empty")
     parser.add_argument(
         "--topics",
         nargs="+",
         metavar="NAME[:TYPE]",
-        help="these topics instead; a type that is not given is that of the first publisher",
+        help="record these topics instead; without TYPE, that of the first publisher",
     )
-    parser.add_argument("--duration", type=positive, metavar="S", help="stop after so many seconds (on Ctrl-C)")
-    parser.add_argument("--split-size", type=size, metavar="BYTES", help="begin a new file from this size on: 500M, 2G")
-    parser.add_argument("--split-duration", type=long_enough, metavar="S", help="begin a new file after so many seconds")
+    parser.add_argument("--duration", type=positive, metavar="S", help="stop after S seconds (default: at Ctrl-C)")
+    parser.add_argument("--split-size", type=size, metavar="BYTES", help="begin a new file at this size: 500M, 2G")
+    parser.add_argument("--split-duration", type=long_enough, metavar="S", help="new file after S seconds")
     kept = "scene of the rig, kept in session.yaml (that of the running twin, if it is there)"
     parser.add_argument("--scene", metavar="SCENE", type=Path, help=kept)
-    parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file, copied too (the package's own)")
-    parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors, copied and used (the package's own)")
-    parser.add_argument("--note", metavar="TEXT", help="kept in session.yaml and in the bag")
-    parser.add_argument("--rig", metavar="NAME", help="kept in the bag: name of the rig, by which `batch` sums up")
-    parser.add_argument("--origin", metavar="TEXT", help="kept there too: where this comes from")
+    parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file to copy (default: the package's)")
+    parser.add_argument("--mapping", metavar="FILE", type=Path, help="mapping to use and copy (default: the package's)")
+    parser.add_argument("--note", metavar="TEXT", help="note, kept in session.yaml and the bag")
+    parser.add_argument("--rig", metavar="NAME", help="name of the rig, by which `batch` sums up")
+    parser.add_argument("--origin", metavar="TEXT", help="origin of the data, kept there too")
     add_ros_args(parser)
 
 

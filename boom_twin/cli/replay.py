@@ -26,17 +26,17 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
     add_namespace(parser, "ROS namespace of the node in the session, for topics and --params")
     parser.add_argument(
-        "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
+        "--no-changes", action="store_true", help="do not repeat recorded changes of load, limits, zeros, nor restarts"
     )
-    purpose = "name causes of what health sees, by twins of booms that have a fault; takes about five times as long"
+    purpose = "name the causes of alarms, by fault twins; takes about five times as long"
     parser.add_argument("--causes", action="store_true", help=purpose)
     parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
     purpose = "do not write the result bag; output_sha256 of the summary is null then, all else is the same"
     parser.add_argument("--no-bag", action="store_true", help=purpose)
     drawn = parser.add_mutually_exclusive_group()
-    drawn.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
-    drawn.add_argument("--report", action="store_true", help="write report.html too, to read or to print")
-    purpose = "in the report, fatigue of all stations: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
+    drawn.add_argument("--no-pictures", action="store_true", help="draw no pictures")
+    drawn.add_argument("--report", action="store_true", help="also write report.html")
+    purpose = "fatigue in the report: detail category of EN 1993-1-9, MPa (without a value 71); extra fatigue"
     parser.add_argument("--fatigue", nargs="?", type=float, const=71.0, metavar="CATEGORY", help=purpose)
     purpose = "write samples.csv or samples.parquet (by pyarrow): predicted, measured, estimated, a row for every stroke stamp"
     parser.add_argument("--table", choices=("csv", "parquet"), help=purpose)

@@ -46,13 +46,13 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_place(parser).add_argument("--map", metavar="P1,P2,..", help=swept)
     load = parser.add_mutually_exclusive_group()
     load.add_argument("--tip", type=numbers, metavar="FX,FY", help="harmonic force at the tip, N (default 0,1)")
-    load.add_argument("--drive", type=int, metavar="CYLINDER", help="harmonic drive of this cylinder, from 1, amplitude 1 m")
+    load.add_argument("--drive", type=int, metavar="CYLINDER", help="harmonic drive of this cylinder, amplitude 1 m")
     pump = "steady state under pump pulses: rate (Hz), height (N), change-over (s, default 0.1); vertical, up"
     load.add_argument("--pump", type=_pump, metavar="RATE:HEIGHT[:S]", help=pump)
     load.add_argument("--load", metavar="CSV", help="steady state under this force at the tip: t_s,fx_N,fy_N, one period")
     parser.add_argument("--from", dest="low", type=float, default=LOW, metavar="F", help="lowest frequency, Hz (default 0.05)")
     parser.add_argument("--to", dest="high", type=float, default=HIGH, metavar="F", help="highest frequency, Hz (default 30)")
-    parser.add_argument("--rates", type=_rates, default=RATES, metavar="F:F:N", help="of a map (default 0.2:1.2:201)")
+    parser.add_argument("--rates", type=_rates, default=RATES, metavar="F:F:N", help="rates of a map, Hz (default 0.2:1.2:201)")
     parser.add_argument("--out", metavar="DIR", help="folder for table and picture: new, empty, or of an earlier response")
     add_json(parser)
 

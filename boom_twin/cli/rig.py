@@ -19,21 +19,21 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the bag and its truth, new or empty")
     moves = parser.add_mutually_exclusive_group()
-    moves.add_argument("--random", metavar="POSTURE", help="random moves from this posture instead of the bundled ones")
+    moves.add_argument("--random", metavar="POSTURE", help="random moves from this posture (default: the bundled ones)")
     through = "moves from posture to posture, as arch,low,arch, with rest periods in each; one posture: the boom stands still"
     moves.add_argument("--through", metavar="POSTURES", help=through)
     acceleration = "of --through: largest acceleration of the undeformed boom's tip, m/s^2 (0.5)"
     parser.add_argument("--tip-acceleration", type=positive, default=0.5, metavar="A", help=acceleration)
-    parser.add_argument("--duration", type=positive, metavar="S", help="s (default 60)")
-    parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise (0)")
-    share = "every k, d, EI and mass of the simulated boom off by this share, at random: 0.02 is 2 %% (0)"
+    parser.add_argument("--duration", type=positive, metavar="S", help="duration, s (default 60)")
+    parser.add_argument("--seed", type=int, default=0, help="seed of moves and sensor noise (default 0)")
+    share = "relative standard deviation of every k, d, EI and mass of the rig: 0.02 is 2 %% (default 0)"
     parser.add_argument("--wrong", type=float, default=0.0, metavar="SHARE", help=share)
-    parser.add_argument("--rig-seed", type=int, default=0, metavar="N", help="of --wrong: one boom for each (0)")
+    parser.add_argument("--rig-seed", type=int, default=0, metavar="N", help="seed of --wrong (default 0)")
     fault = (
         "a fault, for instance cylinder_2.k:softer:0.3 or joint_3.sensor:bias:0.0035@20 (SI units); @20+5..40: from 20 s on, "
         "over 5 s, until 40 s; may be repeated"
     )
-    parser.add_argument("--list-faults", action=ListFaults, nargs=0, help="print all faults with their sizes, and end")
+    parser.add_argument("--list-faults", action=ListFaults, nargs=0, help="print all faults with their sizes, and exit")
     parser.add_argument("--fault", action="append", default=[], metavar="CAUSE:KIND[:SIZE][@ONSET[+RAMP][..END]]", help=fault)
     load = (
         "a load at the tip that no twin knows of: pump:FREQUENCY:HEIGHT[:CHANGE_OVER] (Hz, N, s; pulses, upward) or "
@@ -53,7 +53,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--point", action="append", default=[], metavar="SECTION:AT", help=point)
     pressure = "pressures of both sides of every cylinder; bore and rod (m) of all, or, without a value, as in the scene's oil"
     parser.add_argument("--pressures", nargs="?", const="", metavar="BORE:ROD", help=pressure)
-    parser.add_argument("--rate", type=float, metavar="HZ", help="of all sensors, 50 to 1000 (default 200)")
+    parser.add_argument("--rate", type=float, metavar="HZ", help="rate of all sensors, 50 to 1000 (default 200)")
 
 
 class ListFaults(Action):

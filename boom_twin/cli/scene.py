@@ -10,7 +10,7 @@ from ..scene.load import clearance_text, default_text, example_names, example_te
 
 def add_arguments(parser: ArgumentParser) -> None:
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--clearance", action="store_true", help="with play in the pins between rods and boom")
+    which.add_argument("--clearance", action="store_true", help="scene with play in the pins between rods and boom")
     which.add_argument("--example", metavar="NAME", choices=example_names(), help=f"another boom: {', '.join(example_names())}")
 
 

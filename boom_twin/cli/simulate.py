@@ -26,26 +26,26 @@ FORCE_COLUMNS = ("t_s", "tip_fx_N", "tip_fy_N")
 
 def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser)
-    purpose = "the posture that the first row must be in: a name, or section angles, deg; else it may be any"
+    purpose = "posture that the first row must be in: a name, or section angles, deg (default: any)"
     parser.add_argument("--posture", metavar="NAME", help=purpose)
     followed = parser.add_mutually_exclusive_group(required=True)
-    followed.add_argument("--drive", metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes of the drives)")
-    lengths = "t_s,length_1_m,.. or, as in a session, stroke_1_m,..: cylinder lengths, as transducers read them"
+    followed.add_argument("--drive", metavar="IN.csv", help="strokes of the drives: t_s,stroke_1_m,..")
+    lengths = "cylinder lengths, as transducers read them: t_s,length_1_m,.. or t_s,stroke_1_m,.."
     followed.add_argument("--lengths", metavar="IN.csv", help=lengths)
     pushed = "t_s,tip_fx_N,tip_fy_N: a force at the tip, in the axes of the base; constant before and after its rows"
     parser.add_argument("--force", metavar="IN.csv", help=pushed)
     parser.add_argument("--out", required=True, metavar="OUT.csv", help="results, one row per row of IN.csv")
     parser.add_argument("--dt", type=float, default=1e-3, metavar="S", help="longest step, s (default 0.001)")
     add_json(parser)
-    quick = "step once and say nothing of errors: four to seven times as fast"
+    quick = "skip the error estimate: four to seven times as fast"
     parser.add_argument("--no-error-estimate", action="store_true", help=quick)
-    damping = "numerical damping of the fastest vibrations, as what is left of them after a step: 0 to 1 (default 0.8)"
+    damping = "spectral radius: share of the fastest vibrations left after a step, 0 to below 1 (default 0.8)"
     parser.add_argument("--rho", type=_share, metavar="RHO", help=damping)
 
 
 def _share(text: str) -> float:
-    if (value := not_negative(text)) > 1.0:
-        raise ArgumentTypeError(f"{text}: must be at most 1")
+    if (value := not_negative(text)) >= 1.0:
+        raise ArgumentTypeError(f"{text}: must be below 1, as positions of closed loops are integrated directly")
     return value
 
 

@@ -12,9 +12,9 @@ from .output import open_scene
 
 # kind: (module in boom_twin.validation.study with write(scene, out, quick, posture) -> paths, what it does)
 KINDS: dict[str, tuple[str, str]] = {
-    "error": ("error", "error against run time of all methods, beside Exudyn"),
-    "stability": ("stability", "where each method holds, degrades or fails on stiff and extreme cases"),
-    "parts": ("parts", "what every part of a model costs, and what leaving it out changes"),
+    "error": ("error", "compare error against run time of all methods and of Exudyn"),
+    "stability": ("stability", "find where each method holds, degrades or fails on stiff and extreme cases"),
+    "parts": ("parts", "measure the run time of every part of a model, and the effect of leaving it out"),
 }
 
 
@@ -25,8 +25,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         add_scene(own)
         place = "folder for tables, numbers and pictures: new, empty, or of an earlier study of this kind"
         own.add_argument("--out", required=True, metavar="DIR", help=place)
-        own.add_argument("--posture", metavar="NAME", help="where the motion starts (default: arch, or the first)")
-        own.add_argument("--quick", action="store_true", help="few cases on a short motion")
+        own.add_argument("--posture", metavar="NAME", help="posture where the motion starts (default: arch, or the first)")
+        own.add_argument("--quick", action="store_true", help="run a few cases on a short motion")
 
 
 def run(args: Namespace) -> int:

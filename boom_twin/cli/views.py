@@ -12,10 +12,10 @@ from .arguments import add_namespace
 
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
-        "--out", metavar="DIR", type=Path, required=True, help="folder for the three files; none is written over"
+        "--out", metavar="DIR", type=Path, required=True, help="folder for the three files; none is overwritten"
     )
     add_namespace(parser, "ROS namespace of the twin")
-    parser.add_argument("--frame-prefix", metavar="TEXT", default="", help="as the node's parameter frame_prefix: front/")
+    parser.add_argument("--frame-prefix", metavar="TEXT", default="", help="the node's parameter frame_prefix: front/")
 
 
 def run(args: Namespace) -> int:

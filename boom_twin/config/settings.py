@@ -87,15 +87,15 @@ class _Table(BaseModel):
             return handler(values)
         except ValidationError as error:
             source, others = info.context or (cls.__name__, ())
-            lines = []
+            lines, known = [], ""
             for e in error.errors():
                 name = ".".join(map(str, e["loc"]))
                 told = e["msg"]
                 if e["type"] == "extra_forbidden":
                     told = f"unknown. The nearest is `{nearest(name, [*cls.model_fields, *others])}`"
+                    known = f" Known parameters: {', '.join(cls.model_fields)}."
                 lines.append(f"{name} = {e['input']!r}: {RETIRED.get(name, told)}")
-            known = ", ".join(cls.model_fields)
-            raise UsageError(f"{source}: " + "; ".join(lines) + f". Known parameters: {known}.") from None
+            raise UsageError(f"{source}: " + "; ".join(lines) + f".{known}") from None
 
 
 Table = TypeVar("Table", bound=_Table)

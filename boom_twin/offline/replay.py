@@ -240,7 +240,7 @@ def replay_into(
     recording.close()
     if recording.totals.samples == 1 < recording.refused:
         raise BagError(
-            f"{session.path}: of {1 + recording.refused} {one} samples only the first could be used ({_told(twin)})."
+            f"{session.path}: one {one} sample could be used, {recording.refused} samples were left out ({_told(twin)})."
             f"{_explained(twin.counts)}"
         )
     if options.with_bag:

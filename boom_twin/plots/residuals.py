@@ -196,7 +196,7 @@ def spectrum_picture(path: Path, session: str, history: History, note: str) -> N
             _modes(axes, history.natural)
             legend_above(axes, 2)
         panels[0].set_ylabel("power spectral density, (m/s²)²/Hz")
-        text = f"Welch, segments of {SEGMENT:g} s, Hann window, mean removed"
+        text = f"Welch, segments of {SEGMENT:g} s, Hann window, mean removed; bands: modes of the model"
         panels[0].text(0.02, 0.02, text, transform=panels[0].transAxes, fontsize=11, color=GREY)
 
 

@@ -53,10 +53,10 @@ class MeasuredRest:
 
 def measured_rests(session: MeasuredSession, scene: Scene, rigging: Rigging) -> list[MeasuredRest]:
     """Return the modes of every rest period of at least `SHORTEST_REST` seconds; BagError without one, or without sensors."""
-    periods = rest_periods(session, scene, rigging)
+    periods = rest_periods(session, scene, rigging, needed=0.0)
     long_enough = [each for each in periods if each.times[-1] >= SHORTEST_REST]
     if not long_enough:
-        longest = max(float(each.times[-1]) for each in periods)
+        longest = max((float(each.times[-1]) for each in periods), default=0.0)
         raise BagError(
             f"{session.name}: the longest rest period has {longest:.1f} s; {SHORTEST_REST:g} s are needed. Record a minute or "
             "more at rest, in wind or under the pump."

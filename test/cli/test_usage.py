@@ -37,6 +37,18 @@ def test_a_wrong_word_is_told_with_the_nearest(capsys: pytest.CaptureFixture[str
     assert "Did you mean" not in refused(capsys, "statics", "--posture", "arch", "--qqqqqq")
 
 
+@pytest.mark.parametrize(
+    "arguments, bound",
+    [
+        (["views", "--out", "x", "--namespace", "a b"], "'a b': each part must begin with a letter"),
+        (["monitor", "--port", "99999"], "99999: must be a whole number from 0 to 65535"),
+        (["simulate", "--drive", "x.csv", "--out", "y.csv", "--rho", "1"], "1: must be below 1"),
+    ],
+)
+def test_a_value_out_of_its_bound_is_told(capsys: pytest.CaptureFixture[str], arguments: list[str], bound: str) -> None:
+    assert bound in refused(capsys, *arguments)
+
+
 def test_the_scene_is_one_option_and_a_positional_argument(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene = tmp_path / "heavy.yaml"
     scene.write_text(default_text().replace("postures:", "tip: {payload: 100.0}\npostures:", 1))

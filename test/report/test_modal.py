@@ -111,6 +111,7 @@ def test_modes_of_a_boom_in_wind_are_those_of_its_model(tmp_path: Path, capsys: 
 
 
 def test_a_session_that_rests_too_shortly_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["modal", str(ROOT / "bags" / "arch_session"), "--out", str(tmp_path / "out")]) == 1
-    assert "longest rest period" in capsys.readouterr().err
+    for part in ([], ["--duration", "2"]):
+        assert main(["modal", str(ROOT / "bags" / "arch_session"), "--out", str(tmp_path / "out"), *part]) == 1
+        assert "longest rest period" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
