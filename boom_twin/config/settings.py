@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, ValidationError, ValidationInfo, model_validator
+from pydantic.fields import FieldInfo
 
 from ..errors import UsageError
 from ..sensor_kinds import SensorKind
@@ -122,6 +123,11 @@ def setting(default: float, unit: str, bounds: Mapping[str, Any], meaning: str, 
     return Field(default=default, description=text, allow_inf_nan=False, json_schema_extra={"live": live}, **bounds)
 
 
+def is_live(field: FieldInfo) -> bool:
+    """Return True if a setting can change while the twin runs."""
+    return isinstance(field.json_schema_extra, dict) and bool(field.json_schema_extra["live"])
+
+
 class Thresholds(_Table):
     """Thresholds of ``/diagnostics``, in SI units. They can change at any time and do not affect the prediction."""
 
@@ -201,8 +207,7 @@ class Settings(_Table):
     @classmethod
     def live_names(cls) -> tuple[str, ...]:
         """Return the names of the settings that can change while the twin runs."""
-        extras = {name: field.json_schema_extra for name, field in cls.model_fields.items()}
-        return tuple(name for name, extra in extras.items() if isinstance(extra, dict) and extra["live"])
+        return tuple(name for name, field in cls.model_fields.items() if is_live(field))
 
     @property
     def live(self) -> dict[str, float]:

@@ -94,7 +94,7 @@ class LivePage:
         for each in self._twin.samples(sample, stamp_ns) if isinstance(sample, Mapping) else [sample]:
             reports.append(self._twin.update(each))
             self._feed.put(each, reports[-1])
-        return merged(reports)
+        return reports[0] if len(reports) == 1 else merged(reports)
 
     def __enter__(self) -> Self:
         self._twin.warm_up()

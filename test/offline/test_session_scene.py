@@ -146,7 +146,7 @@ def test_a_given_scene_with_other_values_than_the_recorded_one_is_told(five):
     own = scene_of(five).scene
     assert scene_of(five, own.with_(postures={})).oddities == ()
     (told,) = scene_of(five, own.with_(payload=40.0, line_fill=12.0)).oddities
-    assert told.is_note and f"differs from the scene of the session ({five / FILE_NAME}, scene), and 1 more" in str(told)
+    assert told.kind == "note" and f"differs from the scene of the session ({five / FILE_NAME}, scene), and 1 more" in str(told)
     assert scene_of(five, load_scene()).oddities[0].path == "sections"
 
 
