@@ -20,7 +20,7 @@ from ..messages.topic_table import load_topics
 from ..system.received_files import open_received
 from ..types import SECOND, SENSORS, Stream, stream_of
 from .import_session import Readings, encoded_blocks, read_tables, readings_of
-from .session_file import SessionFile, channel_of, schema_of
+from .session_file import SessionFile, as_bag_error, channel_of, schema_of
 
 _REMEDY = "`boom_twin import` reads files with other columns, units and times."
 
@@ -44,10 +44,8 @@ class CsvFile(SessionFile):
 def summarise(path: Path) -> CsvFile:
     """Return the content of one file. A BagError names a column or value that cannot be used, and its line."""
     rows_to_judge, slowest_step = 20, 1.0  # rows; s from row to row, by which times in another unit are known
-    try:
+    with as_bag_error(path):
         open_received(path).close()
-    except OSError as error:
-        raise BagError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from error
     table, given, topics = CsvLogTable(path), ColumnFile(), load_topics()
     assignment = assign([table], given, None)
     _refuse_others(path, assignment)

@@ -97,7 +97,8 @@ class McapFile(SessionFile):
                     at: len(each) if after is None else int(np.searchsorted(each.log_times, after.message_start_time))
                     for at, each in sorted(held.items())
                 }
-                yield by_log_time(joined([held[at].chosen(slice(0, end)) for at, end in ends.items() if end]))
+                if due := [held[at].chosen(slice(0, end)) for at, end in ends.items() if end]:
+                    yield by_log_time(joined(due))
                 held = {at: held[at].chosen(slice(end, None)) for at, end in ends.items() if end < len(held[at])}
 
 

@@ -8,7 +8,7 @@ from bz2 import BZ2Decompressor
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -182,29 +182,24 @@ def _encoding(connection: Connection) -> str:
 
 
 def _compression(reader: Any) -> str:
-    names = {_lz4: "lz4", _bz2: "bz2"}
+    names = {unpack: name for name, unpack in _BOUNDED.items()}
     return next((names.get(chunk.decompressor, "none") for chunk in reader.chunks.values()), "none")
 
 
-def _bz2(data: bytes) -> bytes:
-    return _within(BZ2Decompressor().decompress(data, MOST_HELD + 1))
-
-
-def _lz4(data: bytes) -> bytes:
-    return _within(LZ4FrameDecompressor().decompress(data, max_length=MOST_HELD + 1))
-
-
-def _within(content: bytes) -> bytes:
+def _unpack(decompressor: Callable[[], Any], data: bytes) -> bytes:
+    content: bytes = decompressor().decompress(data, max_length=MOST_HELD + 1)
     if len(content) > MOST_HELD:
         raise ReaderError(f"a chunk unpacks to more than {MOST_HELD} bytes, the most that is read")
     return content
 
 
+_BOUNDED = {"bz2": partial(_unpack, BZ2Decompressor), "lz4": partial(_unpack, LZ4FrameDecompressor)}
+
+
 @contextmanager
 def _reader(path: Path) -> Iterator[Reader]:
     """Open a file whose chunks unpack within limits. Errors of the file become a BagError."""
-    bounded: dict[Callable[[bytes], bytes], Callable[[bytes], bytes]]
-    bounded = {decompressors["bz2"]: _bz2, decompressors["lz4"]: _lz4}
+    bounded = {decompressors[name]: unpack for name, unpack in _BOUNDED.items()}
     try:
         open_received(path).close()
         with Reader(path) as reader:

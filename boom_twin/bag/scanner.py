@@ -124,16 +124,12 @@ def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:
         return b""
     file.seek(offset)
     record = file.read(PREFIX.size + length)
-    return record if opcode == Opcode.MESSAGE or _fills(opcode, record[PREFIX.size :]) else b""
-
-
-def _fills(opcode: int, body: bytes) -> bool:
-    """Return True if a record can be read and fills its body."""
     try:
-        record_of(opcode, body)
+        if opcode != Opcode.MESSAGE:
+            record_of(opcode, record[PREFIX.size :])
     except PARSE_ERRORS:
-        return False
-    return True
+        return b""
+    return record
 
 
 def _may_begin(file: BinaryIO, offset: int, size: int) -> bool:

@@ -90,9 +90,8 @@ CDR = "cdr"
 PIECE = 2**32  # offset between the places of messages of two pieces of a file, more than the messages of a piece
 REMEDY = "The file is damaged or was cut off: `boom_twin recover BAG --out DIR` saves what is whole."
 
-_LZ4 = (RuntimeError,)
-_PARSING = (struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError)
-PARSE_ERRORS = (McapError, SerdeError, ZstdError, *_LZ4, *_PARSING)  # errors that the parsers raise on invalid bytes
+_PARSING = (struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError, RuntimeError)  # the last by lz4
+PARSE_ERRORS = (McapError, SerdeError, ZstdError, *_PARSING)  # errors that the parsers raise on invalid bytes
 
 
 @contextmanager

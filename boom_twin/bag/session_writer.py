@@ -6,6 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -17,7 +18,7 @@ from .. import __version__
 from ..errors import BagError, UsageError
 from ..messages.mapping import load_mapping
 from ..messages.sample_decoder import LATEST, NO_MEASUREMENT
-from ..messages.topic_table import FRAME, Topics, every_input, factor
+from ..messages.topic_table import FRAME, Topics, every_input, factor, usual
 from ..messages.type_store import fill_header, jazzy, new_message
 from ..scene.load import SceneSource
 from ..twin.sample_check import SampleCheck, samples_of
@@ -67,27 +68,37 @@ def samples_in_rows(
 
 
 def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
-    """Return the message that a rig's sensor sends. An Imu has the acceleration in the plane, and the `rate` (1,) if given."""
+    """Return the message that a rig's sensor sends, with the usual names. An Imu has the `rate` (1,) too, if given."""
+    kind = SENSORS[sample.stream]
+    names = _usual_names(sample.stream, len(sample.values) // (len(kind.ends) or 1))
+    readings = -sample.values if kind.beside else sample.values  # a gyro turns about the axis to the right, see `factor`
+    msg = named_message(Sample(sample.stream, sample.stamp, readings), names)
+    if rate is not None:
+        msg.angular_velocity.y, msg.angular_velocity_covariance[0] = -float(rate[0]), 0.0
+    return msg
+
+
+@cache
+def _usual_names(stream: Stream, joints: int) -> list[str]:
+    return [usual(channel)["name"] for channel in SENSORS[stream].channels(joints)]
+
+
+def named_message(sample: Sample, names: Sequence[str]) -> Any:
+    """Return the message of readings with names by a mapping, or axes. A reading without a name is left out."""
     kind = SENSORS[sample.stream]
     msg = new_message(kind.message)
-    if not kind.is_named:
-        fill_header(msg.header, sample.stamp, kind.stem.removesuffix("_imu"))
-        if kind.field == "point":
-            msg.point.x, msg.point.z = map(float, sample.values)
-            return msg
-        msg.orientation.w = 1.0
-        msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = NO_MEASUREMENT
-        if kind.beside:
-            rate, msg.linear_acceleration_covariance[0] = sample.values, NO_MEASUREMENT
-        else:
-            msg.linear_acceleration.x, msg.linear_acceleration.z = map(float, sample.values)
-        if rate is not None:
-            msg.angular_velocity.y, msg.angular_velocity_covariance[0] = -float(rate[0]), 0.0
+    fill_header(msg.header, sample.stamp, FRAME if kind.is_named else kind.stem.removesuffix("_imu"))
+    pairs = [(name, float(value)) for name, value in zip(names, sample.values, strict=True) if name]
+    if kind.is_named:
+        msg.name = [name for name, _ in pairs]
+        setattr(msg, kind.field, np.array([value for _, value in pairs]))
         return msg
-    fill_header(msg.header, sample.stamp, FRAME)
-    joints = len(sample.values) // (len(kind.ends) or 1)
-    msg.name = [*kind.channels(joints)] if kind.gives else [f"{kind.named}_{end}" for end in kind.ends or range(1, 1 + joints)]
-    setattr(msg, kind.field, np.array(sample.values, dtype=float))
+    for axis, value in pairs:
+        setattr(getattr(msg, kind.field), axis, value)
+    if kind.field != "point":
+        msg.orientation.w = 1.0
+        other = msg.linear_acceleration_covariance if kind.beside else msg.angular_velocity_covariance
+        msg.orientation_covariance[0] = other[0] = NO_MEASUREMENT
     return msg
 
 
@@ -114,19 +125,6 @@ class LogTimes:
         self._stamp = stamp
         self._last = max(self._last, stamp + self._shift)
         return self._last
-
-
-def named_message(sample: Sample, names: Sequence[str]) -> Any:
-    """Return the message of a sensor with names by a mapping, or Imu axes. A value without a name is left out."""
-    msg, kind = sensor_message(sample), SENSORS[sample.stream]
-    pairs = [(name, float(value)) for name, value in zip(names, sample.values, strict=True) if name]
-    if kind.is_named:
-        msg.name = [name for name, _ in pairs]
-        setattr(msg, kind.field, np.array([value for _, value in pairs]))
-        return msg
-    for axis, value in [*((axis, 0.0) for axis in "xyz"), *pairs]:
-        setattr(getattr(msg, kind.field), axis, value)
-    return msg
 
 
 class SessionWriter:

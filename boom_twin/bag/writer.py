@@ -92,10 +92,8 @@ class BagWriter:
         self.counts[key] += 1
         self._extend_span(log_time, log_time, 1)
         published = log_time if publish_time is None else publish_time
-        try:
+        with self._as_bag_error():
             self._writer.add_message(self._channels[key], log_time, data, published, sequence)
-        except OSError as error:
-            raise self.fault(error) from error
 
     def write_block(self, keys: Integers, block: EncodedBlock) -> None:
         """Append many messages, numbered, to the topics with these keys. The bytes are those of `write` for each message."""
@@ -249,16 +247,12 @@ class MessageWriter:
             keys[rows.places] = self._keys[rows.key]
         self._bag.write_block(keys, block)
 
-    def close(self) -> None:
-        """Complete the file, then write ``metadata.yaml``."""
-        self._bag.close()
-
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         if kind is None:
-            self.close()
+            self._bag.close()
             return
         with suppress(BagError):
             self._bag.flush()

@@ -84,7 +84,8 @@ def _faults(found: ColumnFile) -> list[Fault]:
 
 def columns_of_options(given: ColumnFile, options: list[str], timezone: str | None) -> ColumnFile:
     """Return the columns file updated by ``--column CHANNEL=NAME[:UNIT]`` and ``--timezone``."""
-    columns: dict[str, Any] = {channel: _plain(column) for channel, column in given.columns.items()}
+    values = given.model_dump(exclude_unset=True)
+    columns: dict[str, Any] = values.setdefault("columns", {})
     for option in options:
         channel, separator, name = option.partition("=")
         if not (separator and name):
@@ -94,12 +95,7 @@ def columns_of_options(given: ColumnFile, options: list[str], timezone: str | No
             columns[channel] = name
         else:
             columns[channel] = {"column": begin, "unit": unit} if begin and unit_of(unit) else {"column": name}
-    values = {"time": [_plain(entry) for entry in given.time], "timezone": timezone or given.timezone, "columns": columns}
-    return columns_from(values, "--column")
-
-
-def _plain(entry: Any) -> Any:
-    return entry.model_dump(exclude_unset=True) if isinstance(entry, BaseModel) else entry
+    return columns_from({**values, "timezone": timezone or given.timezone}, "--column")
 
 
 @dataclass(frozen=True, slots=True)

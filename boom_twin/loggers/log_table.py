@@ -150,11 +150,7 @@ def _numbers(table: ArrayTable, place: int, array: NDArray[Any]) -> Array:
     try:
         if array.dtype.kind not in "iufO":
             raise TypeError
-        return (
-            np.array([np.nan if value is None else value for value in array], float)
-            if array.dtype.kind == "O"
-            else array.astype(float)
-        )
+        return array.astype(float)  # None becomes NaN
     except (TypeError, ValueError):
         told = f"{table.source}: {table.headers[place]} holds {array.dtype}, as {array[:1].tolist()}"
         raise UsageError(f"{told}. Give numbers, NaN where there is none.") from None

@@ -51,12 +51,9 @@ def gather(content: bytes, places: Integers, size: int) -> NDArray[np.uint8]:
 
 
 def joined(blocks: Sequence[MessageBlock]) -> MessageBlock:
-    """Return the messages of all blocks as one block, in the order of the blocks."""
+    """Return the messages of one or more blocks as one block, in the order of the blocks."""
     if len(blocks) == 1:
         return blocks[0]
-    if not blocks:
-        none = np.zeros(0, np.int64)
-        return MessageBlock(b"", none, np.zeros(0, np.uint64), none, none)
     spans = ((block.content, zip(block.starts.tolist(), block.ends.tolist(), strict=True)) for block in blocks)
     content = b"".join(content[start:end] for content, pairs in spans for start, end in pairs)
     ends = np.cumsum(np.concatenate([block.ends - block.starts for block in blocks]))

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from ..twin.blocks import Integers
 from ..types import SECOND, Array
-from .topic_table import FRAME
-from .type_store import fill_header, jazzy
+from .type_store import jazzy
 
 Bytes = NDArray[np.uint8]
 
@@ -138,11 +137,6 @@ class Template:
         if singles:
             body.view("<f4")[:, self._single_places] = singles
         return [rows[:, span] for span in self._spans]
-
-
-def stamped(header: Any, frame: str = FRAME) -> None:
-    """Put the placeholder of a stamp, and the frame, into a header."""
-    fill_header(header, STAMP * SECOND, frame)
 
 
 def _places(bits: Any, first: int, count: int) -> Any:

@@ -17,8 +17,8 @@ from ..predictions import Estimate, Prediction
 from ..scene.kinematics import PassiveJoints
 from ..scene.schema import Scene
 from ..twin.blocks import STREAMS, EstimateBlock, Integers, PredictionBlock, ReportBlock, ResidualBlock
-from ..types import Alarm, Array, Change, Health, Report, channels_of
-from .cdr_encoder import Bytes, EncodedBlock, EncodedBlockBuilder, NumberFields, Template, stamped
+from ..types import SECOND, Alarm, Array, Change, Health, Report, channels_of
+from .cdr_encoder import STAMP, Bytes, EncodedBlock, EncodedBlockBuilder, NumberFields, Template
 from .numeric_outputs import ESTIMATED, JOINTS, PREDICTED, Chain, Placer, number_rows, selection
 from .sample_decoder import stamp_of
 from .topic_table import FRAME, TIP_JOINTS, Output, type_of
@@ -119,7 +119,7 @@ class ShapeMarkers:
 
     def _marker(self, namespace: str, number: int, kind: int, colour: tuple[float, ...]) -> Any:
         marker = new_message("visualization_msgs/msg/Marker")
-        stamped(marker.header, self._frame)
+        fill_header(marker.header, STAMP * SECOND, self._frame)
         marker.ns, marker.id, marker.type, marker.action = namespace, number, kind, ADD
         marker.pose.orientation.w, marker.lifetime.sec = 1.0, 1
         marker.color.r, marker.color.g, marker.color.b, marker.color.a = colour
@@ -324,7 +324,7 @@ class ReportEncoder:
         messages, fields = list[tuple[str, Any]](), NumberFields()
         for output, put in outputs:
             msg = new_message(type_of(output))
-            stamped(msg.header, self._frame)
+            fill_header(msg.header, STAMP * SECOND, self._frame)
             put(msg, fields)
             messages.append((type_of(output), msg))
         return Template(messages, fields)

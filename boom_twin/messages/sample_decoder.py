@@ -141,7 +141,6 @@ class SampleDecoder:
         self._frames = {stream.value: topic.frame_id for stream, topic in topics.inputs.items()}
         self._areas = topics.areas
         self.refused = 0  # number of messages without a usable value; one without any names and values is not counted
-        self._by_axis = {stream for stream, kind in SENSORS.items() if not kind.is_named}
         self.oddities: Counter[str] = Counter()  # count of each of the irregularities `ODDITIES`
         wanted = {stream: each.wanted for stream, each in self._channels.items()}
         self.assembler = SampleAssembler(wanted, self.oddities, topics.stroke_reading.stream)
@@ -207,7 +206,7 @@ class SampleDecoder:
         return None if reading is None else reading.sample
 
     def _reading(self, stream: Stream, stamp_ns: int, msg: Any) -> Reading | None:
-        is_by_name, taken = stream not in self._by_axis, stamp_ns - self.delays[stream]
+        is_by_name, taken = SENSORS[stream].is_named, stamp_ns - self.delays[stream]
         if is_by_name and not (len(msg.name) or len(getattr(msg, SENSORS[stream].field))):
             return None  # a sign of life
         if not (stamp_ns and 0 < taken < LATEST):

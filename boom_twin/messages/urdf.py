@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..kernels.elements.linkage import LINK_L
 from ..scene.kinematics import CYLINDER, LEFT, RIGHT, linkage
-from ..scene.schema import Cylinder, Scene
+from ..scene.schema import Scene
 from .topic_table import FRAME, TIP_JOINTS, load_topics
 
 NAME = "boom"
@@ -91,18 +91,13 @@ def _section(robot: Element, scene: Scene, i: int) -> None:
 def _cylinder(robot: Element, scene: Scene, i: int) -> None:
     """Add barrel and rod of cylinder `i` (0-based), a swivel at the barrel pin, and a prismatic joint for the stroke."""
     part, row, pivot = scene.joints[i].cylinder, linkage(scene, i), _pivot(scene, i)
-    barrel, rod = f"cylinder_{i + 1}_barrel", f"cylinder_{i + 1}_rod"
-    _barrel_and_rod(robot, barrel, rod, part)
-    _joint(robot, CYLINDER.format(i + 1), "continuous", _carrier(i), barrel, (pivot[0] + row.cx, pivot[1] + row.cy))
-    stroke = _joint(robot, f"cylinder_{i + 1}", "prismatic", barrel, rod, (part.closed_length, 0.0), axis="1 0 0")
-    _limit(stroke, 0.0, part.max_stroke)
-
-
-def _barrel_and_rod(robot: Element, barrel: str, rod: str, part: Cylinder) -> None:
-    closed = part.closed_length
+    barrel, rod, closed = f"cylinder_{i + 1}_barrel", f"cylinder_{i + 1}_rod", part.closed_length
     eye = 0.1 * closed  # of the rod, outside the barrel
     _tube(SubElement(robot, "link", name=barrel), 0.0, closed - eye, 0.045 * closed, "barrel")
     _tube(SubElement(robot, "link", name=rod), -part.max_stroke - eye, 0.0, 0.025 * closed, "rod")
+    _joint(robot, CYLINDER.format(i + 1), "continuous", _carrier(i), barrel, (pivot[0] + row.cx, pivot[1] + row.cy))
+    stroke = _joint(robot, f"cylinder_{i + 1}", "prismatic", barrel, rod, (closed, 0.0), axis="1 0 0")
+    _limit(stroke, 0.0, part.max_stroke)
 
 
 def _links(robot: Element, scene: Scene, i: int) -> None:

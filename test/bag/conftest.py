@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from default_boom import joint_angles_of_strokes, strokes_of_posture
 from fuzz.mcap_files import rewrite
 from recordings import FILE_NAME, Session, read, write_session
+
+from boom_twin import load_scene
 
 NOTES = {"origin": "synthetic, made for a test"}
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -27,6 +30,19 @@ def arrays() -> dict[str, Any]:
         "joints": random.uniform(-2.0, 1.0, (ROWS, 3)),
         "imu": random.normal((0.0, 9.81), 0.05, (ROWS, 2)),
     }
+
+
+@pytest.fixture(scope="session")
+def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two seconds of a gentle move of the default boom. It is only read."""
+    scene, path = load_scene(), tmp_path_factory.mktemp("moving") / "bag"
+    time_s = np.arange(400) / 200.0
+    strokes = strokes_of_posture(scene, "arch") + 0.01 * (1.0 - np.cos(3.0 * time_s))[:, None]
+    joints = np.array([joint_angles_of_strokes(scene, row) for row in strokes])
+    imu = np.random.default_rng(2).normal((0.0, 9.81), 0.05, (400, 2))
+    stamps = 1_700_000_000_000_000_000 + np.arange(400) * 5_000_000
+    write_session(path, stamps, strokes, joints, imu, NOTES)
+    return path
 
 
 @pytest.fixture

@@ -94,6 +94,13 @@ def test_what_is_left_out_is_as_usual(write: Any) -> None:
         ("inputs: [", "not a readable YAML file"),
         ("inputs: {}\ninputs: {}", "inputs = {}: the key is there twice"),
         ("inputs: {cylinder_strokes: {reads: chord}}", "strokes.reads = 'chord': it must be 'length' or 'drive'"),
+        ("inputs: {cylinder_strokes: {delay: auto}}", "strokes.delay = 'auto': every output has the stamp of a stroke sample"),
+        ("inputs: {cylinder_strokes: {delay: auto}}", "Give the others auto"),
+        ("inputs: {cylinder_strokes: {delay: often}}", "or auto"),
+        ("inputs: {cylinder_pressures: {delay: auto}}", "auto is not for forces"),
+        ("inputs: {joint_angles: {frame_id: boom}}", "only IMUs and points have it"),
+        ("inputs: {tip_imu: {bore: [0.1]}}", "only cylinder_pressures has it"),
+        ("sensors: {cylinder_5_cap: {unit: bar}}", "the scene has 4 joints"),
         ("inputs: {joint_angles: {reads: length}}", "inputs.joint_angles.reads = 'length': only cylinder_strokes has it"),
     ],
 )  # fmt: skip

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from command import main
-from default_boom import joint_angles_of_strokes, strokes_of_posture
 from fuzz.mcap_files import rewrite
-from recordings import FILE_NAME, read, scan, write_session
+from recordings import FILE_NAME, read, scan
 from ros_messages import IMU, JOINT_STATE, PADDING, TYPES, decode, encoded, new_message
 from rosbags.serde import SerdeError
 
@@ -59,20 +58,7 @@ def test_what_rclpy_hands_to_raw_publishers_is_read() -> None:
     assert most == PADDING
 
 
-@pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A second of a gentle move, without padding."""
-    scene, path = load_scene(), tmp_path_factory.mktemp("plain") / "bag"
-    time_s = np.arange(200) / 200.0
-    strokes = strokes_of_posture(scene, "arch") + 0.01 * (1.0 - np.cos(3.0 * time_s))[:, None]
-    joints = np.array([joint_angles_of_strokes(scene, row) for row in strokes])
-    imu = np.random.default_rng(2).normal((0.0, 9.81), 0.05, (200, 2))
-    stamps = 1_700_000_000_000_000_000 + np.round(time_s * 1e9).astype(np.int64)
-    write_session(path, stamps, strokes, joints, imu, description={"origin": "synthetic, made for a test"})
-    return path
-
-
-def test_a_session_with_padding_is_replayed_to_the_same_outputs(plain: Path, tmp_path: Path) -> None:
+def test_a_session_with_padding_is_replayed_to_the_same_outputs(moving: Path, tmp_path: Path) -> None:
     scene, types = load_scene(), cycle((JOINT_STATE, JOINT_STATE, IMU))  # in the order of the session
 
     def recoded(data: bytes) -> bytes:
@@ -82,14 +68,14 @@ def test_a_session_with_padding_is_replayed_to_the_same_outputs(plain: Path, tmp
 
     found = {}
     for name, recode in {"none": bytes, "some": recoded}.items():
-        other = rewrite(plain / FILE_NAME, tmp_path / f"{name}.mcap", recode=recode)
+        other = rewrite(moving / FILE_NAME, tmp_path / f"{name}.mcap", recode=recode)
         summary = replay(other, scene, tmp_path / name).summary
         found[name] = summary["output_sha256"], summary["samples"]
-    assert set(found.values()) == {(found["none"][0], 200)}
+    assert set(found.values()) == {(found["none"][0], 400)}
 
 
-def test_one_byte_more_is_refused_by_topic_time_and_place(plain: Path, tmp_path: Path, capsys: Any) -> None:
-    other = rewrite(plain / FILE_NAME, tmp_path / "more.mcap", recode=lambda data: padded(data, PADDING + 1))
+def test_one_byte_more_is_refused_by_topic_time_and_place(moving: Path, tmp_path: Path, capsys: Any) -> None:
+    other = rewrite(moving / FILE_NAME, tmp_path / "more.mcap", recode=lambda data: padded(data, PADDING + 1))
     told = r"more\.mcap: topic /cylinder_strokes at log time 1700000000000000000 ns: .*: 13 bytes stand behind its last field"
     with pytest.raises(BagError, match=told):
         list(read(scan(other), {"cylinder_strokes": JOINT_STATE}))

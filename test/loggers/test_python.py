@@ -128,27 +128,19 @@ def test_a_session_whose_source_failed_is_said_to_be_incomplete(tmp_path: Path, 
         SessionWriter(tmp_path / "s")
 
 
-FAULTS: dict[str, tuple[Mapping[str, Any], int | None, str]] = {
-    "name": ({"cylnder_1": 0.6}, 1, "'cylnder_1': no channel of this boom, which has 4 joints. Did you mean cylinder_1?"),
-    "number": ({"cylinder_5": 0.6}, 1, "'cylinder_5': no channel of this boom"),
-    "unit": ({"cylinder_strokes": [628.8, 168.0, 236.0, 187.0]}, 1, "all above 20 m. Give SI units: m."),
-    "shape": ({"joint_angles": [1.0, 2.0]}, 1, "joint_angles: shape (2,), and this boom has 4 channels there"),
-    "array": ({"joint_1": [1.0, 2.0]}, 1, "joint_1: shape (2,). Give one number"),
-    "text": ({"joint_1": "1,5"}, 1, "joint_1 is '1,5'. Give a number, NaN where there is none."),
-    "no stamp": ({"joint_1": 1.5}, None, "stamp_ns is not given."),
-    "seconds": ({"joint_1": 1.5}, 1.5, "give a whole number of nanoseconds"),  # type: ignore[dict-item]
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_readings_that_no_rig_can_give_are_refused(fault: str) -> None:
-    given, stamp, words = FAULTS[fault]
-    with pytest.raises(UsageError) as error:
-        Twin(load_scene()).update(given, stamp_ns=stamp)
-    assert words in str(error.value)
+def update(given: Mapping[str, Any], stamp: Any = 1) -> Callable[[], Any]:
+    return lambda: Twin(load_scene()).update(given, stamp_ns=stamp)
 
 
 MISUSES: dict[str, tuple[Callable[[], Any], str]] = {
+    "name": (update({"cylnder_1": 0.6}), "'cylnder_1': no channel of this boom, which has 4 joints. Did you mean cylinder_1?"),
+    "number": (update({"cylinder_5": 0.6}), "'cylinder_5': no channel of this boom"),
+    "unit": (update({"cylinder_strokes": [628.8, 168.0, 236.0, 187.0]}), "all above 20 m. Give SI units: m."),
+    "shape": (update({"joint_angles": [1.0, 2.0]}), "joint_angles: shape (2,), and this boom has 4 channels there"),
+    "array": (update({"joint_1": [1.0, 2.0]}), "joint_1: shape (2,). Give one number"),
+    "text": (update({"joint_1": "1,5"}), "joint_1 is '1,5'. Give a number, NaN where there is none."),
+    "no stamp": (update({"joint_1": 1.5}, None), "stamp_ns is not given."),
+    "seconds": (update({"joint_1": 1.5}, 1.5), "give a whole number of nanoseconds"),
     "no sample": (lambda: Twin().update(3), "sample is 3. Give Sample(Stream.STROKES, stamp_ns"),  # type: ignore[arg-type]
     "settings": (lambda: Twin(None, {"health": False}), "give Settings(name=value, ..)"),  # type: ignore[arg-type]
     "setting": (lambda: Settings(gap=-1.0), "Settings: gap = -1.0: Input should be greater than or equal to"),

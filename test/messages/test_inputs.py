@@ -122,9 +122,6 @@ def test_their_noise_is_that_of_the_forces(tmp_path: Path) -> None:
             "inputs: {cylinder_pressures: {bore: [0.1, 0.1, 0.1, 0.1], rod: [0.05, 0.1, 0.05, 0.05]}}",
             "cylinder 2 has bore 0.1 and rod 0.1 m, and the rod must be thinner",
         ),
-        ("inputs: {cylinder_strokes: {delay: auto}}", "inputs.cylinder_strokes.delay = 'auto': every output has the stamp"),
-        ("inputs: {tip_imu: {bore: [0.1]}}", "only cylinder_pressures has it"),
-        ("sensors: {cylinder_5_cap: {unit: bar}}", "the scene has 4 joints"),
     ],
 )
 def test_what_is_missing_or_wrong_is_told(tmp_path: Path, text: str, told: str) -> None:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ros_messages import SampleDecoder, Topics, imu, joint_state, load_topics, new_message
 
-from boom_twin import Stream, UsageError
+from boom_twin import Stream
 from boom_twin.messages.mapping import mapping_from
 from boom_twin.messages.sample_decoder import MOST_NAMES, ODDITIES
 from boom_twin.messages.topic_table import Sensor, usual
@@ -237,13 +237,6 @@ def test_messages_of_another_frame_are_left_out_and_counted(frame_id: str, taken
     assert decoder.oddities["another frame"] == decoder.refused == (not taken)
 
 
-def test_a_delay_may_be_unknown_but_for_what_drives_the_model() -> None:
+def test_a_delay_may_be_unknown() -> None:
     topics = mapping_from({"inputs": {"joint_angles": {"delay": "auto"}, "tip_imu": {"delay": "auto"}}}, "mapping")
     assert topics.lagging == [Stream.ANGLES, Stream.IMU] and topics.delay(Stream.ANGLES) == 0
-    with pytest.raises(UsageError, match="auto is not for forces"):
-        mapping_from({"inputs": {"cylinder_pressures": {"delay": "auto"}}}, "mapping")
-    for delay, told in (("auto", "Give the others auto"), ("often", "seconds .* or auto")):
-        with pytest.raises(UsageError, match=told):
-            mapping_from({"inputs": {"cylinder_strokes": {"delay": delay}}}, "mapping")
-    with pytest.raises(UsageError, match="only IMUs and points have it"):
-        mapping_from({"inputs": {"joint_angles": {"frame_id": "boom"}}}, "mapping")

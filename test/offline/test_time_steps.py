@@ -102,12 +102,7 @@ def named(found: list[Sample]) -> list[tuple[str, int]]:
 @pytest.mark.parametrize("step", [int(0.05 * SECOND), 3 * SECOND, 3600 * SECOND])
 @pytest.mark.parametrize(
     "options",
-    [
-        {"chunk_size": 2**30},
-        {"chunk_size": 4000},
-        {"index_types": IndexType.NONE, "chunk_size": 4000},
-        {"use_chunking": False},
-    ],
+    [{"chunk_size": 2**30}, {"chunk_size": 4000}, {"index_types": IndexType.NONE, "chunk_size": 4000}, {"use_chunking": False}],
     ids=["one chunk", "chunks", "no index", "no chunks"],
 )
 def test_messages_are_in_file_order_where_the_clock_was_set_back(tmp_path: Path, options: dict[str, Any], step: int) -> None:
