@@ -233,9 +233,9 @@ def _scan(path: Path, incomplete: str) -> Session:
 
 
 def _overlap(files: Sequence[SessionFile]) -> str:
-    """Return a warning if two successive files overlap in time, as those of one recorder do only if its clock is set back."""
+    """Return a warning if two files overlap in time, as those of one recorder do only if its clock is set back."""
     queue = 10**9  # ns, longest time that a message waits in a recorder
-    for one, other in pairwise(files):
+    for one, other in pairwise(sorted(files, key=lambda file: file.start)):
         if (shared := min(one.end, other.end) - max(one.start, other.start)) > queue:
             names = f"{one.path.name} and {other.path.name}"
             return f"{names} overlap by {shared * NANO:.1f} s. If they are two recordings, give each a folder of its own."
