@@ -43,17 +43,15 @@ class Sentence(NamedTuple):
 
 SENTENCES = {
     "stuck": Sentence("{thing} repeats one reading again and again", "Check its cable and supply"),
-    "noise": Sentence("{thing} is much noisier than its like", "Check its cable, shield and mount"),
+    "noise": Sentence("{thing} is much noisier than similar sensors", "Check its cable, shield and mount"),
     "spikes": Sentence("{thing} gives single readings far from their neighbours", "Check its cable and plug"),
-    "jump": Sentence("{thing} jumped at once, as no boom can", "Check its mount; if it stays, set its zero"),
+    "jump": Sentence("{thing} jumped faster than the boom can move", "Check its mount; if it stays, set its zero"),
     "dropout": Sentence("{thing} gives no readings", "Check its cable, supply and driver"),
     "dropout joint_angles": Sentence("no readings of {thing} are used", "Check that one driver sends them, and its cable"),
     "dropout cylinder_forces": Sentence("no readings of {thing} are used", "Check that one driver sends them, and its cable"),
     "intermittent": Sentence("{thing} fails again and again", "Check its cable and plug"),
-    "range": Sentence("{thing} reads what it cannot", "Check its unit, sign and zero in the mapping"),
-    "wiring": Sentence(
-        "{thing} is wired otherwise than the mapping says", "Record slow moves, then run `boom_twin mapping --check`"
-    ),
+    "range": Sentence("{thing} gives impossible readings", "Check its unit, sign and zero in the mapping"),
+    "wiring": Sentence("{thing} is not wired as the mapping says", "Record slow moves, then run `boom_twin mapping --check`"),
     "wiring scene": Sentence("the scene is of another boom", "Give the scene of this boom"),
     "late": Sentence("stamps of {thing} are late", "Correct their delay in the mapping"),
     "late cylinder_strokes": Sentence("stamps of {thing} are late", "Give all other streams the negative delay in the mapping"),
@@ -77,16 +75,20 @@ SENTENCES = {
     "softer stiffness": Sentence(
         "{thing} is softer than the scene says", "Stop, and look for outriggers that sink and loose bolts", True
     ),
-    "more payload": Sentence("the boom carries more than the payload that is set", "Look what hangs at the tip, then set it"),
-    "less payload": Sentence("the boom carries less than the payload that is set", "Look what hangs at the tip, then set it"),
+    "more payload": Sentence(
+        "the boom carries more than the payload that is set", "Check what hangs at the tip, then set the payload"
+    ),
+    "less payload": Sentence(
+        "the boom carries less than the payload that is set", "Check what hangs at the tip, then set the payload"
+    ),
     "more line_fill": Sentence("the pipe line holds more than the line fill that is set", "Set the line fill"),
     "less line_fill": Sentence("the pipe line holds less than the line fill that is set", "Set the line fill"),
     "off": Sentence("{thing}, or the length transducer beside it, reads wrong", "Compare both at rest, then set the zero"),
     "off cylinder_force": Sentence("{thing} reads wrong", "Check the sensor's zero and scale"),
     "gap": Sentence("cylinder lengths were missing", "Check cable and driver of the length transducers"),
     "gap joint_angles": Sentence("joint angles were missing", "Check cable and driver of the angle sensors"),
-    "clock": Sentence("a clock was set", "Nothing, if it was on purpose"),
-    "": Sentence("{thing} does not behave as the model", "Look at it"),
+    "clock": Sentence("a clock was set", "No action is needed if this was intended"),
+    "": Sentence("{thing} does not behave as the model", "Inspect it"),
 }
 """Sentences by kind of alarm, some by kind of channel or parameter too. The last one is for unknown kinds."""
 

@@ -248,7 +248,7 @@ def _doubts(
     yield from ringing(own.jolt, own.shake, own.square)
     yield from warnings_of(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step")
     yield from warnings_of(
-        by_rows, f"the rows of the drive, up to {apart:g} s apart, say too little", "give rows closer together"
+        by_rows, f"the rows of the drive, up to {apart:g} s apart, are too coarse", "give rows closer together"
     )
     yield from too_fast(times, own.rates)
 

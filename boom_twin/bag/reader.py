@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
 from hashlib import sha256
 from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 from ..errors import BagError
 from ..messages.type_store import other_than_jazzy
 from ..system.received_files import holds_file, sha256_of
+from ..types import NANO
 from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata, refuse_packed
 from .session_file import CDR, WHOLE, SessionBlocks, SessionFile, TimeWindow, compare_counts
 from .session_model import incompleteness, kept_origin
@@ -230,8 +232,18 @@ def _scan(path: Path, incomplete: str) -> Session:
         checked=all(file.checked for file in filled),
         notes=notes,
         metadata=metadata,
-        incomplete="" if RECOVERED in notes else incomplete,
+        incomplete="" if RECOVERED in notes else incomplete or ("" if metadata else _overlap(filled)),
     )
+
+
+def _overlap(files: Sequence[SessionFile]) -> str:
+    """Return a warning if two files overlap in time, as those of one recorder do only if its clock is set back."""
+    queue = 10**9  # ns, longest time that a message waits in a recorder
+    for one, other in pairwise(sorted(files, key=lambda file: file.start)):
+        if (shared := min(one.end, other.end) - max(one.start, other.start)) > queue:
+            names = f"{one.path.name} and {other.path.name}"
+            return f"{names} overlap by {shared * NANO:.1f} s. If they are two recordings, give each a folder of its own."
+    return ""
 
 
 def read(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE) -> Iterator[tuple[str, int, Any]]:

@@ -338,4 +338,4 @@ def strokes_of(session: Path | None, mapped: Mapped) -> SessionStrokes:
     made = re.match(r"(\d{1,9})\.(\d{1,9})", version)
     if made and (int(made[1]), int(made[2])) < lengths_since:
         return SessionStrokes(StrokeReading.DRIVE, f"made by the virtual rig of version {version}")
-    return SessionStrokes(StrokeReading.LENGTH, "nothing else is said; for drives give reads: drive in a mapping")
+    return SessionStrokes(StrokeReading.LENGTH, "the default; for drives give reads: drive in a mapping")

@@ -99,7 +99,7 @@ def run(args: Namespace) -> int:
     if sheet.scene is None:
         tell("no scene is kept in session.yaml: none was given by --scene, and no twin told its own")
     if not any(count.received for count in counts):
-        remedy = "Check that the publishers run, as the same user, and ROS_DOMAIN_ID."
+        remedy = "Check that the publishers run, as the same user, and ROS_DOMAIN_ID. Record into another --out."
         raise BoomTwinError(f"{args.out}: nothing came. {remedy}")
     return 0
 

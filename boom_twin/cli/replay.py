@@ -57,7 +57,7 @@ def run(args: Namespace) -> int:
     check_kind(args.table)
     window = window_of(args)
     if window.start:
-        tell(f"at {window.start:g} s the model starts at rest, whatever the boom did: its first seconds show that")
+        tell(f"the model starts at rest at {window.start:g} s: ignore its first seconds if the boom moved")
     tell("preparing the model (compiles for up to a minute the first time) ..")
     out, sources = Path(args.out), files_of(args, "bag", "scene", "params", "mapping")
     with result_folder(out, REPLAY, sources) as building:

@@ -118,6 +118,8 @@ def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array
     """
     table = read_csv(path, UsageError)
     stem = next((stem for stem in stems if f"{stem}_1_m" in table.names), stems[0])
+    if (more := f"{stem}_{n + 1}_m") in table.names:
+        raise UsageError(f"{path}: column {more}, but the scene has {n} cylinders. Give the scene of this boom, or remove it.")
     found = _columns(table, ("t_s", *(f"{stem}_{i + 1}_m" for i in range(n))))
     return found[:, 0], found[:, 1:], stem
 

@@ -325,7 +325,7 @@ def as_text(one: ComparedSession, other: ComparedSession, rows: list[ComparisonR
         numbers = "".join(f" {_number(value):>12s}" for value in (row.a, row.b, row.difference))
         mark = {True: "differs", False: "", None: "?"}[row.is_significant]
         lines.append(f"{row.name:32s}{numbers} {_number(row.sigma):>10s}  {row.unit:6s} {mark}".rstrip())
-    lines += ["", f"differs: by more than {SIGNIFICANT:g} standard deviations; ?: it is not known how sure the figures are"]
+    lines += ["", f"differs: by more than {SIGNIFICANT:g} standard deviations; ?: the uncertainty is unknown"]
     lines.append("damping, peaks and moments also differ where postures and moves do")
     for letter, side in (("A", one), ("B", other)):
         lines.append(f"alarms of {letter}, {side.name}: {len(side.alarms) or 'none'}")

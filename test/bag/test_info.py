@@ -50,6 +50,20 @@ def write(directory: Path, rows: list[Row]) -> Path:
     return directory
 
 
+def test_two_recordings_in_one_folder_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Files of one recorder follow each other, whatever their names are."""
+    (tmp_path / "both").mkdir()
+    for name, first in (("a", 0), ("b", 3), ("c", 6)):
+        rows: list[Row] = [(Stream.STROKES, START + t, START + t, ["cylinder_1"]) for t in (first * 10**9, (first + 3) * 10**9)]
+        (write(tmp_path / name, rows) / FILE_NAME).rename(tmp_path / "both" / f"{name}.mcap")
+    assert told(capsys, tmp_path / "both")["incomplete"] is None
+    (tmp_path / "both" / "b.mcap").rename(tmp_path / "both" / "a2.mcap")
+    (tmp_path / "both" / "c.mcap").write_bytes((tmp_path / "both" / "a2.mcap").read_bytes())
+    assert told(capsys, tmp_path / "both")["incomplete"].startswith(
+        "a2.mcap and c.mcap overlap by 3.0 s. If they are two recordings"
+    )
+
+
 def test_gaps_clocks_and_stamps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     steps = [0, 1, 2, 3, 3, 23, 24, 22]
     rows: list[Row] = [(Stream.STROKES, START + k * STEP, START + t * STEP, ["cylinder_1"]) for k, t in enumerate(steps)]

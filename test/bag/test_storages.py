@@ -165,7 +165,7 @@ def test_a_window_is_a_part_of_the_session_and_starts_at_rest(
 ) -> None:
     arguments = ["replay", str(moving), "--no-pictures", "--no-health", "--out", str(tmp_path / "out"), "--table", "csv"]
     assert main([*arguments, "--start", "1", "--duration", "0.5"]) == 0
-    assert "at 1 s the model starts at rest" in capsys.readouterr().err
+    assert "the model starts at rest at 1 s" in capsys.readouterr().err
     rows = np.genfromtxt(tmp_path / "out" / "samples.csv", delimiter=",", names=True)
     assert len(rows) == 100 and rows["t_s"][0] == 0.0
     whole = [message.position[0] for name, _, _, message in messages(scan(moving)) if name == "/cylinder_strokes"]

@@ -172,3 +172,16 @@ def test_what_cannot_be_is_told_before_anything_is_simulated(
 ) -> None:
     assert main(["rig", str(scene), "--out", str(scene.with_name("never")), "--random", "up", "--duration", "3", *options]) == 1
     assert told in capsys.readouterr().err and not scene.with_name("never").exists()
+
+
+def test_an_interrupt_while_exudyn_steps_stops_without_a_traceback(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt(_: object, row: int) -> None:
+        if row > 0:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("boom_twin.validation.rig.stepping.ParameterChanges.hand_over", interrupt)
+    assert main(["rig", str(scene), "--out", str(tmp_path / "rig"), "--random", "up", "--duration", "3"]) == 1
+    assert capsys.readouterr().err.endswith("boom_twin rig: stopped\n")
+    assert not (tmp_path / "rig").exists()

@@ -69,6 +69,15 @@ def columns(path: Path) -> dict[str, np.ndarray]:
     return {name: table[name] for name in table.dtype.names}
 
 
+def test_a_drive_with_more_cylinders_than_the_boom_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "drive.csv").write_text(
+        "t_s,stroke_1_m,stroke_2_m,stroke_3_m\n0,0.2,0.1,0.1\n1,0.2,0.1,0.1\n", encoding="utf-8"
+    )
+    boom = str(Path(__file__).parents[2] / "examples" / "two_section_boom.yaml")
+    assert main(["simulate", boom, "--drive", str(tmp_path / "drive.csv"), "--out", str(tmp_path / "out.csv")]) == 1
+    assert "column stroke_3_m, but the scene has 2 cylinders" in capsys.readouterr().err
+
+
 def test_results_of_another_boom_are_replaced_and_no_drive_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, drive = tmp_path / "out.csv", tmp_path / "drive.csv"
     drive.write_text(f"{HEADER}0,{','.join(map(str, STROKES[0]))}\n")

@@ -133,6 +133,10 @@ def step_through(boom: Boom, course: Course, step: float, output_step: float, sc
         raise SolverError(
             f"The rig stopped in a motion of {count * step:g} s ({failure}). Take a step smaller than {step:g} s."
         ) from failure
+    except exudyn.ModelError as failure:
+        if "KeyboardInterrupt" in str(failure):  # Ctrl-C in the function before a step
+            raise KeyboardInterrupt from None
+        raise
     finally:
         boom.push(np.zeros(2))
         course.changes.restore()
