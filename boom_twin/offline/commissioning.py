@@ -67,7 +67,7 @@ def wiring_of(bag: Path, scene: SceneSource | SessionScene, mapping: str | Path 
     try:
         found = commission(bag, scene, mapping, TimeWindow(window.start, duration), with_lags=False)
     except (BagError, UsageError) as error:
-        return f"not checked: {str(error).splitlines()[0]}"
+        return f"not checked: {str(error).splitlines()[0].rstrip('.')}"
     if not found.wrong and found.checked.has_strokes_alone:
         return STROKES_ALONE
     if not found.wrong:
