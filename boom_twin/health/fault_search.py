@@ -21,6 +21,7 @@ from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
 from .causes import (
+    CAME_BACK,
     MEMORY,
     TEMPER,
     Evidence,
@@ -37,7 +38,6 @@ from .sensor_check import Flags
 
 RATIO = 1.4  # of successive trial sizes of a named fault
 IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
-CAME_BACK = 0.3  # remaining share of a zero's change, below which the fault has ended
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
 WARM_UP = 10  # s of recent samples that new twins take first: they start at rest, and the boom may be moving
 
@@ -184,7 +184,7 @@ class FaultSearch:
             if creeps or stamp - verdict.onset < SPAN * SECOND:
                 return []
         if (found := self._sized(fault, verdict.onset)) is None:
-            self._decide_anew()
+            self._decision.discard(verdict.place)
             return []
         sized, spread, onset = found
         ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)

@@ -70,6 +70,16 @@ def test_the_better_of_two_causes_keeps_its_lead():
     assert found.place == 0 and second - 20 + 1 == math.ceil(ENOUGH / MOST_GAIN)
 
 
+def test_a_fault_of_no_size_takes_only_its_own_evidence_with_it():
+    """Once the evidence of a fault is discarded, another one is named by what it gained before."""
+    evidence = Evidence(load_scene(), [SPRING, SECTION], SETTINGS)
+    found = [evidence.take(second * SECOND, np.array([0.0, 8.0, 6.0])) for second in range(30)]
+    assert found[-1].place == 0
+    evidence.discard(0)
+    after = evidence.take(30 * SECOND, np.array([0.0, 8.0, 6.0]))
+    assert (after.place, after.onset) == (1, 0)
+
+
 def test_a_hypothesis_is_the_scene_with_its_faults():
     """Faults change what they are named after, together, and warm oil softens every cylinder."""
     scene = load_scene()
