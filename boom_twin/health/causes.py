@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..config.settings import Settings
+from ..deviation.kalman import ANGLE_ZERO
 from ..deviation.predictor import LAG_FLOOR
 from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
@@ -133,8 +134,10 @@ def usual_size(scene: Scene, fault: Fault, error: float) -> float:
     """
     if fault.kind == "softer":
         return error
-    if not fault.is_load:
-        return LAG_FLOOR if fault.kind == "late" else 0.0
+    if fault.kind == "off":  # a part that is wrong turns a joint as its sensor's zero would
+        return ANGLE_ZERO if fault.channel.startswith("joint_") else 0.0
+    if fault.kind == "late":
+        return LAG_FLOOR
     payload = error * explain(scene).mass / math.sqrt(3.0 * len(scene.sections))
     return payload if fault.cause == "tip.payload" else 2.0 * payload / scene.reach
 

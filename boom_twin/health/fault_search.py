@@ -189,8 +189,7 @@ class FaultSearch:
         sized, spread, onset = found
         ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
         evidence = evidence_of(sized, spread) if fault.is_told else ""
-        alarm = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
-        self._named[sized] = alarm
+        alarm = self._named[sized] = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
         self._begin()
         return [alarm] if fault.is_told else []
 
@@ -217,13 +216,13 @@ class FaultSearch:
         size is not surely larger than the largest that a healthy boom seems to have, or a force's below the set deviation.
         """
         odds = self._settings.name_odds
-        sure = math.log(odds / (1.0 - odds))
+        sure, usual = math.log(odds / (1.0 - odds)), usual_size(self._scene, fault, self._settings.scene_error)
         if fault.kind == "off":
             changed, spread = self._change_of_zero(fault, onset)
+            spread = math.hypot(spread, usual)
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
-            is_found = 0.5 * (changed.size / spread) ** 2 > sure and abs(changed.size) >= least
-            return (changed, spread, onset) if is_found else None
-        usual = usual_size(self._scene, fault, self._settings.scene_error)
+            is_sure = 0.5 * (changed.size / spread) ** 2 > sure
+            return (changed, spread, onset) if is_sure and abs(changed.size) >= least else None
         least = NormalDist().inv_cdf(0.5 + 0.5 * odds) * usual
         healthy = self._course(fault._replace(size=least), onset)
 

@@ -176,19 +176,28 @@ def test_a_cause_that_helps_at_any_size_is_not_named():
     assert taken(twins, 40) == []
 
 
-@pytest.mark.parametrize(("change", "named"), [(4e3, []), (6e3, ["cylinder_force_2.sensor"])])
-def test_a_force_is_named_above_the_deviation_that_is_an_alarm(change, named):
-    """Its zero changes in second 20, known to 100 N; `force_deviation` is 5 kN."""
+@pytest.mark.parametrize(
+    ("channel", "sigma", "change", "is_named"),
+    [
+        ("cylinder_force_2", 1e2, 4e3, False),
+        ("cylinder_force_2", 1e2, 6e3, True),
+        ("joint_2", 1e-5, 4e-4, False),
+        ("joint_2", 1e-5, 6e-4, True),
+    ],
+)
+def test_a_sensor_is_named_off_above_what_a_healthy_boom_shows(channel, sigma, change, is_named):
+    """Its zero changes in second 20. `force_deviation` is 5 kN; errors of the statics turn a joint by 0.2 mrad."""
 
     class Doubting(Follower):
         def zeros(self, channels):
             """Return the zero, and its variance."""
-            return np.array([change * (self.evidence > 0.0)]), np.array([100.0**2])
+            return np.array([change * (self.evidence > 0.0)]), np.array([sigma**2])
 
     def made(each):
-        return Doubting(lambda second: 30.0 * ("cylinder_force_2" in each.doubted and second >= 20))
+        return Doubting(lambda second: 30.0 * (channel in each.doubted and second >= 20))
 
-    assert [alarm.cause for alarm in taken(FaultTwins(load_scene(), made, SETTINGS), 40)] == named
+    named = [alarm.cause for alarm in taken(FaultTwins(load_scene(), made, SETTINGS), 40)]
+    assert named == [f"{channel}.sensor"] * is_named
 
 
 def test_a_boom_as_believed_that_had_to_restart_is_no_evidence():
