@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
 from typing import NamedTuple, TypeVar
 
@@ -47,11 +46,6 @@ class MeasuredRows(NamedTuple):
     raw: Array
     left: Array
     sigmas: Array
-
-    @classmethod
-    def room(cls, rows: int, channels: int) -> MeasuredRows:
-        """Return arrays for so many rows, not filled."""
-        return cls(np.empty(rows, np.int64), *np.empty((3, rows, channels)))
 
 
 Rows = TypeVar("Rows", PredictionRows, MeasuredRows)
@@ -110,7 +104,7 @@ class BlockBuilder:
     """Open blocks, in the order of time."""
 
     def __init__(self) -> None:
-        self._open: deque[Block] = deque()
+        self._open: dict[int, Block] = {}  # by number, without a gap
         self._closed = -1
 
     def predicted(self, followed: PredictionRows) -> None:
@@ -127,20 +121,15 @@ class BlockBuilder:
 
     def close(self, stamp: int) -> list[Block]:
         """Return blocks for which no sample is awaited once a stroke has come with `stamp` (ns); they may be empty."""
-        done = []
-        while self._open and self._open[0].end + BLOCK <= stamp:
-            done.append(self._open.popleft())
-            self._closed = done[-1].number
+        done = [self._open.pop(number) for number in sorted(self._open) if (number + 2) * BLOCK <= stamp]
+        self._closed = done[-1].number if done else self._closed
         return done
 
     def _at(self, number: int) -> Block | None:
         """Return the block of a number, and open those in between; None if it is closed already."""
         if number <= self._closed:
             return None
-        if not self._open:
-            self._open.append(Block(number))
-        while self._open[-1].number < number:
-            self._open.append(Block(self._open[-1].number + 1))
-        while self._open[0].number > number:
-            self._open.appendleft(Block(self._open[0].number - 1))
-        return self._open[number - self._open[0].number]
+        if number not in self._open:
+            known = number, *self._open
+            self._open = {each: self._open.get(each) or Block(each) for each in range(min(known), max(known) + 1)}
+        return self._open[number]

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..config.settings import Settings
+from ..deviation.kalman import ANGLE_ZERO
 from ..deviation.predictor import LAG_FLOOR
 from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
@@ -34,6 +35,7 @@ LATE = 0.02  # s, delay of the stamps of a stream
 TEMPER = math.log(20.0) / 25.0  # power of likelihoods: 25 nats more make a cause 20 times as probable
 MOST_GAIN = 12.0  # nats by which the likelihood of a second is below the best, at most
 MEMORY = 60  # s of gains that are kept
+CAME_BACK = 0.3  # remaining share of the change of a sensor's zero, or of its jump, below which that has ended
 
 
 class Fault(NamedTuple):
@@ -132,8 +134,10 @@ def usual_size(scene: Scene, fault: Fault, error: float) -> float:
     """
     if fault.kind == "softer":
         return error
-    if not fault.is_load:
-        return LAG_FLOOR if fault.kind == "late" else 0.0
+    if fault.kind == "off":  # a part that is wrong turns a joint as its sensor's zero would
+        return ANGLE_ZERO if fault.channel.startswith("joint_") else 0.0
+    if fault.kind == "late":
+        return LAG_FLOOR
     payload = error * explain(scene).mass / math.sqrt(3.0 * len(scene.sections))
     return payload if fault.cause == "tip.payload" else 2.0 * payload / scene.reach
 
@@ -173,10 +177,7 @@ class Evidence:
     def take(self, stamp: int, likelihoods: Array) -> Verdict | None:
         """Take the log likelihoods of a second that begins at a stamp (ns); return the verdict if a fault is named.
 
-        Parameters
-        ----------
-        likelihoods : ndarray, shape (1 + faults,)
-            That of the boom as believed first, nats.
+        `likelihoods` (1 + faults,) in nats: the boom as believed first.
         """
         believed = likelihoods[0] + self._wrong @ np.maximum(likelihoods[0] - likelihoods[1:], 0.0)
         likelihoods = np.array([believed, *likelihoods[1:]])
@@ -196,6 +197,11 @@ class Evidence:
         shown = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])[:3]
         shown.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in shown))))
         return Verdict(best, self._stamps[min(int(onsets[best]) + 1, len(self._stamps) - 1)], tuple(shown))
+
+    def discard(self, place: int) -> None:
+        """Discard the evidence of one fault up to now, because its size is none that is named; others keep theirs."""
+        for gains in self._gains:
+            gains[place] = self._gains[-1][place]
 
 
 def evidence_of(fault: Fault, spread: float) -> str:

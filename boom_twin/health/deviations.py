@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +24,6 @@ GONE = 0.5  # share of the limit below which a deviation ends
 SETTLED = round(3.0 * WINDOW / NANO)  # ns below that share before it ends: a mean forgets all but 5 %
 
 
-@dataclass
-class _Deviation:
-    alarm: Alarm
-    seen: int  # ns, end of the newest block that has it
-
-
 class DeviationMonitor:
     """Monitor of the slow means of one stream's residuals.
 
@@ -47,12 +41,13 @@ class DeviationMonitor:
         self._reach = np.cumsum(lengths[::-1])[::-1] if stream is Stream.ANGLES else None  # m, boom outboard of each joint
         force = np.full(len(self._names), settings.force_deviation)
         self._limits = force if self._reach is None else settings.tip_deviation / self._reach
-        self._since, self._last = np.full(len(self._names), -1), dict[int, _Deviation]()
+        self._since, self._seen = np.full((2, len(self._names)), -1)  # ns, of each deviation and of its newest block
+        self._last = dict[int, Alarm]()
 
     @property
     def alarms(self) -> Sequence[Alarm]:
         """Active alarms."""
-        return [each.alarm for each in self._last.values()]
+        return list(self._last.values())
 
     def take(self, readings: StreamReadings, masked: NDArray[np.bool_], block: Block) -> list[Alarm]:
         """Take a block, without the channels that are `masked`; return the alarms that began or ended."""
@@ -69,14 +64,12 @@ class DeviationMonitor:
         self._since = np.where(is_far, np.where(self._since < 0, block.start, self._since), -1)
         for i in np.flatnonzero(is_far & ~is_explained & (block.end - self._since >= LASTING)).tolist():
             if i not in self._last:
-                alarm = Alarm(self._names[i], KIND, int(self._since[i]), None, None, self._evidence(i, off[i]))
-                self._last[i] = _Deviation(alarm, block.end)
-                news.append(alarm)
-        for i, each in list(self._last.items()):
-            if not is_near[i]:
-                each.seen = block.end
-            if masked[i] or block.end - each.seen > SETTLED:
-                news.append(replace(self._last.pop(i).alarm, until=each.seen))
+                self._last[i] = Alarm(self._names[i], KIND, int(self._since[i]), None, None, self._evidence(i, off[i]))
+                news.append(self._last[i])
+        self._seen[~is_near] = block.end
+        for i in [*self._last]:
+            if masked[i] or block.end - self._seen[i] > SETTLED:
+                news.append(replace(self._last.pop(i), until=int(self._seen[i])))
         return news
 
     def _evidence(self, i: int, off: Array) -> str:

@@ -21,6 +21,7 @@ from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
 from .causes import (
+    CAME_BACK,
     MEMORY,
     TEMPER,
     Evidence,
@@ -37,7 +38,6 @@ from .sensor_check import Flags
 
 RATIO = 1.4  # of successive trial sizes of a named fault
 IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
-CAME_BACK = 0.3  # remaining share of a zero's change, below which the fault has ended
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
 WARM_UP = 10  # s of recent samples that new twins take first: they start at rest, and the boom may be moving
 
@@ -184,13 +184,12 @@ class FaultSearch:
             if creeps or stamp - verdict.onset < SPAN * SECOND:
                 return []
         if (found := self._sized(fault, verdict.onset)) is None:
-            self._decide_anew()
+            self._decision.discard(verdict.place)
             return []
         sized, spread, onset = found
         ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
         evidence = evidence_of(sized, spread) if fault.is_told else ""
-        alarm = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
-        self._named[sized] = alarm
+        alarm = self._named[sized] = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
         self._begin()
         return [alarm] if fault.is_told else []
 
@@ -217,13 +216,13 @@ class FaultSearch:
         size is not surely larger than the largest that a healthy boom seems to have, or a force's below the set deviation.
         """
         odds = self._settings.name_odds
-        sure = math.log(odds / (1.0 - odds))
+        sure, usual = math.log(odds / (1.0 - odds)), usual_size(self._scene, fault, self._settings.scene_error)
         if fault.kind == "off":
             changed, spread = self._change_of_zero(fault, onset)
+            spread = math.hypot(spread, usual)
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
-            is_found = 0.5 * (changed.size / spread) ** 2 > sure and abs(changed.size) >= least
-            return (changed, spread, onset) if is_found else None
-        usual = usual_size(self._scene, fault, self._settings.scene_error)
+            is_sure = 0.5 * (changed.size / spread) ** 2 > sure
+            return (changed, spread, onset) if is_sure and abs(changed.size) >= least else None
         least = NormalDist().inv_cdf(0.5 + 0.5 * odds) * usual
         healthy = self._course(fault._replace(size=least), onset)
 

@@ -26,13 +26,7 @@ WINDOWS = 12 * EVERY, 6 * EVERY, 3 * EVERY  # blocks of each: shorter ones see a
 
 
 class LagMonitor:
-    """Monitor of the stamps of all streams.
-
-    Parameters
-    ----------
-    drive : Stream
-        Quantity that drives the model, which lags are against.
-    """
+    """Monitor of the lags of all streams behind `drive`, the stream that drives the model."""
 
     def __init__(self, drive: Stream) -> None:
         self._drive, self._alarms = drive, dict[Stream, Alarm]()

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Place, Stream, StrokeReading
-from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows, PredictionRows
+from ..types import NANO, SECOND, SENSORS, Alarm, Array, Health, Mount, Place, Stream, StrokeReading
+from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows
 from .causes import explains
 from .deviations import SIGMAS, DeviationMonitor
 from .fault_twins import FaultTwins
@@ -20,7 +20,7 @@ from .sensor_monitor import SensorMonitor
 from .tip_load import TipLoadMonitor
 from .wiring_monitor import WiringMonitor
 
-PERIOD = 1_000_000_000  # ns between two `Health` without news
+PERIOD = SECOND  # ns between two `Health` without news
 UNCERTAIN = 2.0  # variances of a stroke reading; while a stroke is known worse, sensors are not compared with the prediction
 KNOWN = 0.25  # weight of the slow means of an IMU from which on it is used: after 0.6 s, once its wiring is checked
 MEASURED_NOISE = (Stream.STROKES, Stream.ANGLES)  # streams whose noise is reported: an IMU's is not told from vibration
@@ -47,6 +47,8 @@ class HealthMonitor:
 
     Attributes
     ----------
+    blocks : BlockBuilder
+        It takes predictions and measured samples.
     fault_twins : FaultTwins or None
         They name causes.
     """
@@ -84,7 +86,7 @@ class HealthMonitor:
     def begin(self) -> None:
         """Restart with the boom at rest; alarms of sensors last."""
         settings = self._settings
-        self._blocks = BlockBuilder()
+        self.blocks = BlockBuilder()
         fastest = {self._drive: settings.rate(self._reads)}
         self._checks = {
             stream: SensorCheck(*settings.noise(kind), *self._ranges[stream], fastest.get(stream, 0.0))
@@ -96,14 +98,6 @@ class HealthMonitor:
         self._lags.begin()
         self._wiring.begin()
         self._load.begin()
-
-    def predicted(self, followed: PredictionRows) -> None:
-        """Take predictions, at least one."""
-        self._blocks.predicted(followed)
-
-    def measured(self, stream: Stream, compared: MeasuredRows) -> None:
-        """Take samples of one stream with their residuals, at least one."""
-        self._blocks.measured(stream, compared)
 
     @property
     def suspected(self) -> NDArray[np.bool_]:
@@ -130,14 +124,10 @@ class HealthMonitor:
     def judge(self, stamp: int, loads: tuple[Array, Array], tip_sigmas: Callable[[], Array]) -> Health | None:
         """Judge the blocks that strokes with `stamp` (ns) complete; return None if there is nothing to report.
 
-        Parameters
-        ----------
-        loads : two ndarray, shape (2, 2)
-            Force at the tip that the model does not know, predicted and estimated, N, and its variances.
-        tip_sigmas : callable
-            Asked, if there is something to tell, for the standard deviations of the predicted tip, m, shape (2,).
+        `loads`: predicted and estimated force at the tip that the model does not know, N, and its variances, (2, 2) each.
+        `tip_sigmas` returns the standard deviations of the predicted tip, m, (2,); it is called only for a report.
         """
-        done = self._blocks.close(stamp)
+        done = self.blocks.close(stamp)
         news = [alarm for block in done if block.followed for alarm in self._judge(block)]
         if any(alarm.kind == "late" for alarm in (*self._lags.alarms, *self._named)):  # late readings look like forces
             self._load.begin()

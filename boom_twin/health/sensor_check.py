@@ -158,7 +158,7 @@ class SensorCheck:
         self._survey, self._find, self._summarise = SameTypes(survey), SameTypes(find), SameTypes(summarise)
         self._newest = np.zeros(BEFORE), *np.full((2, BEFORE, count), np.nan)  # stamps (s), readings, residuals
         self._calm = SensorFindings({}, np.zeros(count), np.full(count, np.nan))
-        self._nothing = StreamReadings(MeasuredRows.room(0, count), unknown, self.slow, False)
+        self._nothing = StreamReadings(MeasuredRows(np.empty(0, np.int64), *np.empty((3, 0, count))), unknown, self.slow, False)
 
     @property
     def noise(self) -> float:
@@ -168,14 +168,8 @@ class SensorCheck:
     def summary(self, rows: MeasuredRows | None, masked: NDArray[np.bool_], span: float) -> StreamReadings:
         """Return the numbers of a block, and take it into the slow means.
 
-        Parameters
-        ----------
-        rows : MeasuredRows or None
-            NaN of what is missing, or what the model does not have.
-        masked : ndarray of bool, shape (channels,)
-            Sensors that are not to be trusted; their slow means begin anew.
-        span : float
-            Length (s) of the block that the slow means take; 0 if they are to leave it out.
+        `rows` has NaN for a missing reading or prediction. Slow means of `masked` channels (channels,) restart. `span` is the
+        length (s) of the block for the slow means; 0 leaves it out.
         """
         if rows is None or not len(rows.stamps):
             return self._nothing
@@ -184,16 +178,9 @@ class SensorCheck:
         return StreamReadings(rows, self._known.means.copy(), self.slow, bool(is_bent))
 
     def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
-        """Take the readings of a block.
+        """Return the findings in a block that ends at `now` (s): stamps (k,) in s, readings and expected ones (k, channels).
 
-        Parameters
-        ----------
-        stamps : ndarray, shape (k,)
-            s.
-        raw, expected : ndarray, shape (k, channels)
-            As measured, NaN where not, and as the model has them.
-        now : float
-            End of the block, s.
+        A reading that is missing is NaN.
         """
         if not len(stamps):
             silent = now - self._known.heard > SILENT_FOR

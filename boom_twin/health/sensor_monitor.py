@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from ..types import NANO, SENSORS, Alarm, Array, Stream
+from ..types import NANO, SECOND, SENSORS, Alarm, Array, Stream
 from .alarms import change_text
-from .sensor_check import MISSTATED, NOISE_OVER, Flags, SensorFindings
+from .causes import CAME_BACK, MEMORY
+from .sensor_check import MISSTATED, NOISE_OVER, WINDOW, Flags, SensorFindings
 from .sensor_survey import MEASURED
 
-SETTLED = 2_000_000_000  # ns without the fault after which it has ended
-AGAIN = 60_000_000_000  # ns between failures of one intermittent contact
-CAME_BACK = 0.3  # of a jump, by which a sensor that came back may still be off
+SETTLED = round(WINDOW / NANO)  # ns without the fault after which it has ended
+AGAIN = MEMORY * SECOND  # ns between failures of one intermittent contact
 WHOLE = -1  # place of the whole stream behind its channels
 
 
@@ -92,13 +92,7 @@ class SensorMonitor:
         masked[slice(None) if WHOLE in failing else failing] = True
         self.masked = self.masked if (masked == self.masked).all() else masked
 
-    def take(
-        self,
-        findings: SensorFindings,
-        start: int,
-        end: int,
-        newest: Array | None = None,
-    ) -> list[Alarm]:
+    def take(self, findings: SensorFindings, start: int, end: int, newest: Array | None = None) -> list[Alarm]:
         """Take the findings of a block from `start` to `end` (ns); return alarms that began or ended.
 
         `newest`: by how much the block's last readings are off (strokes: the readings), shape (channels,), if it has any.
@@ -116,12 +110,8 @@ class SensorMonitor:
             if kind not in self._sensors.alarms or not flags.any():
                 continue
             for channel in self._chosen(flags & self._there, kind):
-                if kind == "jump" and self._is_wild(channel):
-                    continue
-                jump = (float(findings.jumped[channel]), float(findings.level[channel])) if kind == "jump" else None
-                off = float(findings.level[channel]) if kind == "range" and self._is_predicted else math.nan
-                evidence = change_text(off, self._sensors.unit) if math.isfinite(off) else ""
-                news += self._seen(channel, kind, start, end, jump, evidence)
+                if kind != "jump" or not self._is_wild(channel):
+                    news += self._seen(channel, kind, start, end, findings)
         for key, fault in list(self._faults.items()):
             off = abs(float(newest[key[0]])) if newest is not None and self._is_predicted else math.inf
             if key[1] == "jump" and not off < abs(fault.before) + CAME_BACK * abs(fault.offset):
@@ -155,22 +145,21 @@ class SensorMonitor:
         """Return True if jumps mean nothing: the sensor has another fault, out of which it jumps when it recovers."""
         return (channel, "jump") not in self._faults and any(known in (channel, WHOLE) for known, _ in self._faults)
 
-    def _seen(
-        self, channel: int, kind: str, start: int, end: int, jump: tuple[float, float] | None, evidence: str
-    ) -> list[Alarm]:
-        """Begin, keep or end a fault that was found again; of a jump its step, and how far the reading is off after it."""
+    def _seen(self, channel: int, kind: str, start: int, end: int, findings: SensorFindings) -> list[Alarm]:
+        """Begin, keep or end a fault that was found in a block."""
         key = (channel, kind)
         fault = self._faults.get(key)
-        size, level = jump or (0.0, math.nan)
+        size, level = float(findings.jumped[channel]) if kind == "jump" else 0.0, float(findings.level[channel])
         if fault is not None:
-            off = min(abs(fault.offset + size), abs(level - fault.before)) if math.isfinite(level) else abs(fault.offset + size)
+            off = np.fmin(abs(fault.offset + size), abs(level - fault.before))
             if size * fault.offset < 0.0 and off < CAME_BACK * abs(fault.offset):
                 del self._faults[key]
                 return fault.ended(end)
             fault.seen = end
             return []
         name = self._names[channel]
-        evidence = change_text(size, self._sensors.unit) if size else evidence
+        off = size if kind == "jump" else level if kind == "range" and self._is_predicted else math.nan
+        evidence = change_text(off, self._sensors.unit) if math.isfinite(off) else ""
         is_first = all(known != channel for known, _ in self._faults)
         if is_first:
             self._onsets[channel] = [*(t for t in self._onsets.get(channel, []) if start - t < AGAIN), start]

@@ -100,20 +100,9 @@ class WiringMonitor:
         return is_of_reading and alarm.channel in self._chosen(self._wrong | self._doubted)
 
     def take(self, block: Block, strokes: Array, failing: Mapping[Stream, NDArray[np.bool_]]) -> list[Alarm]:
-        """Take a block.
+        """Take a block with its mean strokes (n,) in m; return the alarms that began or ended.
 
-        Parameters
-        ----------
-        block : Block
-        strokes : ndarray, shape (n,)
-            Mean of the measured strokes, m.
-        failing : mapping of Stream to ndarray of bool
-            Channels that fail by themselves; they are left out once their wiring is known to be right.
-
-        Returns
-        -------
-        list of Alarm
-            Those that began or ended.
+        Channels that are `failing` by themselves are left out once their wiring is known to be right.
         """
         if self._age < CHECKS[-1]:
             means = {Stream.STROKES: strokes}

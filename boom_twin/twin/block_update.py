@@ -184,14 +184,14 @@ class BlockUpdate:
         if counts[0] > predicted:
             own = slice(predicted, counts[0])
             variances = found.rows[own, self._boom.places.variances].copy()
-            self._judge.predicted(PredictionRows(found.stamps[own].copy(), found.measured[own].copy(), variances))
+            self._judge.blocks.predicted(PredictionRows(found.stamps[own].copy(), found.measured[own].copy(), variances))
         streams = found.residual_streams[compared : counts[1]]
         present = set(streams.tolist())
         for code, width in self._measured:
             if code in present:
                 rows = compared + np.flatnonzero(streams == code)
                 values = (each[rows, :width] for each in (found.raw, found.values, found.sigmas))
-                self._judge.measured(STREAMS[code], MeasuredRows(found.residual_stamps[rows], *values))
+                self._judge.blocks.measured(STREAMS[code], MeasuredRows(found.residual_stamps[rows], *values))
 
     def _predictions(self, own: slice, outlines: dict[int, Outline]) -> PredictionBlock:
         found, at = self._found, self._boom.places
