@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from ..deviation.channels import specific_force_row
-from ..deviation.kalman import FAST, correct, free_sensors, make_transition, transit
+from ..deviation.kalman import FAST, correct, first_variances, make_transition, transit
 from ..deviation.rows import (
     about_rest,
     acceleration_row,
@@ -136,10 +136,13 @@ def start_rest(p, f, x, covariance, loads, zero2):
     """Set the state to rest at the posture; the covariance allows for vibration, and for drives beside it."""
     n, m, size, zero = p.drives.shape[0], p.modes[0], all_states(p), zero_place(p)
     load, drive = force_place(p), drive_place(p)
+    first_variances(p, f, f.gain)
     for i in range(size):
         x[i] = 0.0
         for k in range(size):
             covariance[i, k] = 0.0
+        if i >= zero:
+            covariance[i, i] = f.gain[i]
     for j in range(m):
         motion2 = p.readings[2 + n + j, n] ** 2 + p.readings[2 + n + j, n + 1] ** 2
         covariance[j, j] = AMPLITUDE * AMPLITUDE / max(motion2, 1e-300)
@@ -153,6 +156,5 @@ def start_rest(p, f, x, covariance, loads, zero2):
         x[drive + i], covariance[drive + i, drive + i] = p.drives[i], DRIVE * DRIVE
         covariance[zero + 4 + i, zero + 4 + i] = zero2[2 + i]
         f.jerk[i], f.pulls[i] = 0.0, p.pulled[i]
-    free_sensors(p, f, covariance)
     for k in range(f.drift.shape[0]):
         f.drift[k] = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .channels import IMU_DRIFT, IMU_SCALE, IMU_TURN, TIP_IMU_STATES
+from .channels import IMU_DRIFT, IMU_SCALE, IMU_TURN, IMU_ZERO, TIP_IMU_STATES
 from .rows import clear, read, spread_of
 from .states import PREDICTION, drive_place, force_place, whole, zero_place
 
@@ -160,18 +160,19 @@ def propagate(p, f, h, lines, width):
 
 
 @inner
-def free_sensors(p, f, covariance):
-    """Write the variances of unknown states of sensors: mount and scale of the IMU, zeros of forces, errors of the others."""
+def first_variances(p, f, variances):
+    """Write the variances of sensors' errors of which nothing is known yet, at the places of these states."""
     n, zero, largest = p.drives.shape[0], zero_place(p), 0.0
-    covariance[zero + 2, zero + 2], covariance[zero + 3, zero + 3] = IMU_TURN * IMU_TURN, IMU_SCALE * IMU_SCALE
+    variances[zero] = variances[zero + 1] = IMU_ZERO * IMU_ZERO
+    variances[zero + 2], variances[zero + 3] = IMU_TURN * IMU_TURN, IMU_SCALE * IMU_SCALE
     for i in range(n):
         largest = max(largest, abs(f.pulls[i]))
     for i in range(n):
-        at = zero + 4 + n + i
-        covariance[at, at] = (FORCE_ZERO * (abs(f.pulls[i]) + 0.1 * largest)) ** 2
+        variances[zero + 4 + i] = ANGLE_ZERO * ANGLE_ZERO
+        variances[zero + 4 + n + i] = (FORCE_ZERO * (abs(f.pulls[i]) + 0.1 * largest)) ** 2
     further = TIP_IMU_STATES + 2 * n
     for k in range(further, p.behind[0]):
-        covariance[zero + k, zero + k] = p.errors[k - further].first ** 2
+        variances[zero + k] = p.errors[k - further].first ** 2
 
 
 @inner

@@ -8,7 +8,7 @@ from ..kernels.jit import inner
 from .states import ALL_VALVES, BURST, OPEN, PREDICTION, VALVES, whole
 
 MODELS = BURST + 1  # of a mixture
-LEAST_CHANCE = 1e-9  # of a model, from which it can grow again
+LEAST_CHANCE = 1e-60  # of a model, so that none is 0: the rates let it grow again, but for a load while a valve is open
 OPENS, CLOSES = 0.3, 1.0  # 1/s, rates at which valves open, and are closed again
 COMES, STAYS = 0.2, 1.0  # 1/s, rates at which a load comes while all valves are closed, and is usual again
 

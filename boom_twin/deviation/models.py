@@ -28,11 +28,9 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .channels import IMU_ZERO
 from .kalman import (
-    ANGLE_ZERO,
     FAST,
-    free_sensors,
+    first_variances,
     gain_after,
     make_transition,
     subtract,
@@ -47,11 +45,11 @@ from .states import (
     ALL_BURST,
     ALL_VALVES,
     BURST,
+    DOUBTS,
     ESTIMATE,
     FED,
     OPEN,
     PREDICTION,
-    RESTARTS,
     VALVES,
     all_states,
     drive_place,
@@ -63,7 +61,7 @@ from .states import (
 JERK = 3e-3  # m^2/s^5, density of the jerk of a drive that begins to move
 CLOSED_RATE, CLOSED_ACCELERATION = 1e-5, 1e-3  # m/s, m/s^2, noise of the reading that a closed valve's drive stands still
 LONGEST_STEP = 0.02  # s of one transition
-CONTRADICTION = 8.0  # standard deviations of the predicted tip, by which the estimate may be off it
+CONTRADICTION = 8.0  # standard deviations by which the tips of estimate and prediction may differ
 MOST_EXCESS = 1e6  # times the variance that a channel is stated to have
 
 
@@ -73,10 +71,7 @@ def start_models(p, f, speed, swing):
     n, m, size = p.drives.shape[0], p.modes[0], all_states(p)
     load, drive = force_place(p), drive_place(p)
     noise, x, covariance = f.noise, f.x[VALVES], f.p[VALVES]
-    for i in range(f.x.shape[1]):
-        x[i] = 0.0
-        for k in range(f.x.shape[1]):
-            covariance[i, k] = 0.0
+    f.x[:], f.p[:] = 0.0, 0.0
     f.load2[:] = noise.usual_load * noise.usual_load
     for a in range(2):
         covariance[load + a, load + a] = f.load2[0, a]
@@ -104,7 +99,7 @@ def start_models(p, f, speed, swing):
     f.excess[:], f.ratio[:], f.shaking[:] = 1.0, 1.0, 0.0
     f.bends[:], f.swing[:], f.sway2[:] = 0.0, 0.0, 0.0
     mix(f, PREDICTION, zero_place(p))
-    follow_prediction(p, f)
+    take_prediction(p, f, 1.0)
     f.status[FED] = 0
 
 
@@ -144,7 +139,7 @@ def step_models(p, f, h, y):
         evidence = weigh_models(f, mixture)
         mix(f, mixture, states_of(p, mixture))
     if f.status[FED] == 1:
-        leave_contradiction(p, f, size)
+        doubt_estimate(p, f, size)
     f.evidence[0] += evidence
     if h > 0.0:
         for mixture in range(mixtures):
@@ -152,7 +147,7 @@ def step_models(p, f, h, y):
         learn_jerk(p, f, h)
         learn_load(p, f, h)
     if f.status[FED] == 0:
-        follow_prediction(p, f)
+        take_prediction(p, f, 1.0)
 
 
 @inner
@@ -216,41 +211,52 @@ def take_lengths(p, f, k, size, y):
 
 
 @inner
-def leave_contradiction(p, f, size):
-    """Restart the estimate if its tip is far outside what the lengths allow; channels with excess noise lose weight.
+def doubt_estimate(p, f, size):
+    """Doubt the estimate if its tip is far off the predicted one; channels with excess noise lose weight.
 
-    The difference of an estimate and one with fewer readings has at most the variance of the latter.
+    Either may be wrong: the prediction where a valve opens unseen, the estimate where a sensor fails. So both are equally
+    likely from then on.
     """
-    n = p.drives.shape[0]
+    n, is_doubted = p.drives.shape[0], False
     for a in range(2):
         column_row(p, p.readings, n + a, 1.0, f.row)
         apart = read(f.row, f.mean[ESTIMATE], size) - read(f.row, f.mean[PREDICTION], size)
-        if apart * apart > CONTRADICTION * CONTRADICTION * variance_of(f.row, f.spread[PREDICTION], f.gain, size):
-            f.status[FED] = 0
-    if f.status[FED] == 0:
-        f.status[RESTARTS] += 1
+        variance = variance_of(f.row, f.spread[ESTIMATE], f.gain, size) + variance_of(f.row, f.spread[PREDICTION], f.gain, size)
+        is_doubted |= apart * apart > CONTRADICTION * CONTRADICTION * variance
+    if is_doubted:
+        f.status[DOUBTS] += 1
         for c in range(f.excess.shape[0]):
             f.excess[c] = min(f.excess[c] * f.excess[c], MOST_EXCESS)
+        take_prediction(p, f, 0.5)
 
 
 @inner
-def follow_prediction(p, f):
-    """Set the estimate to the prediction; the sensors' zeros are unknown then."""
+def take_prediction(p, f, share):
+    """Give the prediction a `share` of the probability of the estimate; of a share of 1 the estimate is the prediction.
+
+    Mean and covariance are those of both together,
+
+        x = (1 - s) x_e + s x_p,    P = (1 - s) P_e + s P_p + s (1 - s) (x_e - x_p) (x_e - x_p)^T.
+
+    The prediction knows nothing of sensors' errors. A valve that is open in either is open.
+    """
     p.delayed[0] = 0
-    size, every, n = zero_place(p), all_states(p), p.drives.shape[0]
+    size, every, n, kept = zero_place(p), all_states(p), p.drives.shape[0], 1.0 - share
+    first_variances(p, f, f.gain)
     for i in range(n):
-        f.is_open[ESTIMATE, i], f.still[ESTIMATE, i] = f.is_open[PREDICTION, i], f.still[PREDICTION, i]
+        if kept == 0.0 or f.is_open[PREDICTION, i] == 1:
+            f.is_open[ESTIMATE, i], f.still[ESTIMATE, i] = f.is_open[PREDICTION, i], f.still[PREDICTION, i]
     for k in range(ALL_VALVES, ALL_BURST + 1):
         source = k - ALL_VALVES
-        f.chances[k] = f.chances[source]
+        f.chances[k] = kept * f.chances[k] + share * f.chances[source]
         for i in range(every):
-            f.x[k, i] = f.x[source, i] if i < size else 0.0
+            f.row[i] = f.x[k, i] - (f.x[source, i] if i < size else 0.0)
+            f.x[k, i] -= share * f.row[i]
+        for i in range(every):
             for j in range(every):
-                f.p[k, i, j] = f.p[source, i, j] if i < size and j < size else 0.0
-        covariance = f.p[k]
-        for a in range(2):
-            covariance[size + a, size + a] = IMU_ZERO * IMU_ZERO
-        for i in range(n):
-            covariance[size + 4 + i, size + 4 + i] = ANGLE_ZERO * ANGLE_ZERO
-        free_sensors(p, f, covariance)
+                f.p[k, i, j] = kept * (f.p[k, i, j] + share * f.row[i] * f.row[j])
+                if i < size and j < size:
+                    f.p[k, i, j] += share * f.p[source, i, j]
+            if i >= size:
+                f.p[k, i, i] += share * f.gain[i]
     mix(f, ESTIMATE, every)

@@ -32,7 +32,7 @@ from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .rest_at_readings import RestFinder
 from .sensor_model import mounting_of
-from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, RESTARTS, Filters, SensorNoise, drive_place, new_filters, zero_place
+from .states import DOUBTS, ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 GAUGE_DRIFT = 0.03  # share of the moment in a root second, by which the zero of a strain gauge drifts
@@ -302,9 +302,9 @@ class BoomPredictor:
         return float(self.filters.evidence[0])
 
     @property
-    def restarts(self) -> int:
-        """How often the estimate was restarted because the lengths contradicted it."""
-        return int(self.filters.status[RESTARTS])
+    def doubts(self) -> int:
+        """How often the estimate was doubted because its tip was far off the predicted one."""
+        return int(self.filters.status[DOUBTS])
 
     @property
     def tip_loads(self) -> tuple[Array, Array]:

@@ -5,7 +5,15 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .channels import READS_ACCELERATION, READS_ANGLE, READS_COORDINATE, READS_RATE, TIP_IMU_STATES, measurement_row
+from .channels import (
+    READS_ACCELERATION,
+    READS_ANGLE,
+    READS_COORDINATE,
+    READS_FORCE,
+    READS_RATE,
+    TIP_IMU_STATES,
+    measurement_row,
+)
 from .delayed import delayed_row, note_lateness
 from .kalman import ANGLE_ZERO, correct, gain_after, take_gains, take_innovation
 from .learning import SURPRISE
@@ -13,7 +21,7 @@ from .mixture import MODELS, mix, weigh_models
 from .rows import SWAY_SHARE, clear, difference, read, variance_of
 from .states import ALL_BURST, ALL_VALVES, ESTIMATE, FED, FED_STAMP, PREDICTION, all_states, zero_place
 
-INEXACT = 0.03  # error of the model's accelerations and rates of turn: share of their root mean square at the site
+INEXACT = 0.03  # error of the model: share of accelerations and rates of turn at a site (rms), of forces beside those at rest
 LEARN_NOISE = 0.02  # weight of one reading in the learnt noise of its channel
 LEARN_RATIO = 0.005  # weight of one reading in means of its channel: square of normalised innovations, residuals of angles
 DOF = 4.0  # degrees of freedom of Student's t, the distribution of innovations of the estimate
@@ -68,6 +76,9 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         variance = channel.noise2
         if channel.kind == READS_ACCELERATION:
             variance += INEXACT * INEXACT * f.shaking[channel.site, 0]
+        elif channel.kind == READS_FORCE:
+            beside = f.pulls[channel.index] - p.pulled[channel.index]
+            variance += INEXACT * INEXACT * beside * beside
         elif channel.kind == READS_RATE:
             variance += INEXACT * INEXACT * f.shaking[channel.site, 1]
         elif channel.kind == READS_ANGLE:

@@ -18,7 +18,7 @@ VALVES, OPEN, BURST = range(3)  # models of the prediction
 ALL_VALVES, ALL_OPEN, ALL_BURST = range(3, 6)  # models of the estimate
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
 LOADS = 6  # states of the load at the tip: along x and y its fast part (2), its slow part (2), rates of the fast part (2)
-FED, FED_STAMP, RESTARTS = range(3)  # of `status`
+FED, FED_STAMP, DOUBTS = range(3)  # of `status`
 DELAYED = 128  # states at most that hold readings of late streams, see `delayed`
 
 
@@ -45,7 +45,7 @@ class Filters(NamedTuple):
     mean, spread : (2, s), (2, s, s) of the mixtures. load2 : (2, 2) variances of the fast load, N^2, of prediction and
     estimate, along x and y.
     jerk : (n,) m^2/s^5. is_open, still : (2, n) 1 where a valve is believed open, s since its drive began to stand still.
-    status : (3,) whether the estimate has readings of its own, stamp of the newest of these, restarts by a contradiction.
+    status : (3,) whether the estimate has readings of its own, stamp of the newest of these, doubts by the prediction.
     masked, deaf : (c,), (n,) measured channels that the estimate, and strokes that no model is to use. noise : variances.
     excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
     drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,

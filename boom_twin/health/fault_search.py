@@ -50,8 +50,8 @@ class Follower(Protocol):
         """Log likelihood of all readings."""
 
     @property
-    def restarts(self) -> int:
-        """How often the estimate was restarted because the lengths contradicted it."""
+    def doubts(self) -> int:
+        """How often the estimate was doubted because its tip was far off the predicted one."""
 
     @property
     def requests(self) -> Any:
@@ -150,11 +150,11 @@ class FaultSearch:
         leaks = [] if self._reads is StrokeReading.ANGLE else self._creep.take(second.stamp, second.block)
         if leaks:
             self._decide_anew()
-        restarts = self._twins[0].restarts
+        doubts = self._twins[0].doubts
         for each, twin in zip(self._hypotheses, self._twins, strict=True):
             _feed(twin, each, second)
-        if self._twins[0].restarts > restarts:
-            self._recent.clear()  # it has forgotten zeros and load; any other would gain by what it still knows
+        if self._twins[0].doubts > doubts:
+            self._recent.clear()  # it has half forgotten zeros and load; any other would gain by what it still knows
             self._begin()
             return leaks
         return [*leaks, *self._decided(second.stamp)]

@@ -88,9 +88,9 @@ class Twin(SampleTaker):
         self.requests.zero({})  # no new zeros: this marks a change as due with the first strokes
 
     @property
-    def restarts(self) -> int:
-        """How often the estimate was restarted because the lengths contradicted it."""
-        return self._boom.restarts
+    def doubts(self) -> int:
+        """How often the estimate was doubted because its tip was far off the predicted one."""
+        return self._boom.doubts
 
     @property
     def evidence(self) -> float:

@@ -117,7 +117,7 @@ class Follower:
     """A twin whose evidence grows by nats a second that depend on its boom and on the stamp; keeps the changes it is told."""
 
     def __init__(self, rate):
-        self.evidence, self.restarts, self.changes, self._rate = 0.0, 0, [], rate
+        self.evidence, self.doubts, self.changes, self._rate = 0.0, 0, [], rate
 
     def take(self, block):
         """Take a second of samples."""
@@ -210,7 +210,7 @@ def test_a_boom_as_believed_that_had_to_restart_is_no_evidence():
             second = int(block.stamps[0]) // SECOND
             self.first = second if self.first is None else self.first
             self.evidence += self._rate(second) * (self.first < 20 <= second)
-            self.restarts += self._rate(second) == 0.0 and second == 20
+            self.doubts += self._rate(second) == 0.0 and second == 20
 
     assert taken(FaultTwins(load_scene(), lambda each: Knowing(lambda _: 100.0 * spring_of(each)), SETTINGS), 60) == []
 
