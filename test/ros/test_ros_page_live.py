@@ -106,7 +106,7 @@ def shows_what_was_said(page: Any, witness: Witness) -> None:
         lamps = {row[1].strip(): (row[2], row[3].strip()) for row in rows}
         newest = [{each.name.partition(": ")[2]: each for each in msg.status} for msg in witness.diagnostics[-4:]]
         judged = {alarm.channel for msg in witness.health[-4:] for alarm in decode_health(msg)}
-        return bool(lamps and judged) and all(  # the source's angles lack the boom's deflection
+        return bool(lamps) and all(
             name in judged
             or any(
                 name in each and level.endswith(LEVELS[each[name].level[0]].name) and words == each[name].message
