@@ -106,7 +106,7 @@ def echo_on_events() -> None:
 def source(rate_text: str, duration_text: str, *more: str) -> None:
     """Send, once it has been found; prints a line when it begins, and the stamps of the strokes.
 
-    More words: ``imu`` sends that too, ``later=S`` stamps by a clock that is ahead by so many seconds, ``even`` stamps with the
+    More words: ``imu`` sends that too, ``stuck`` repeats one reading of the angles from the fifth second on, ``later=S`` stamps by a clock that is ahead by so many seconds, ``even`` stamps with the
     time when a message was due, as a rig that samples by its own clock, not with that of sending.
     """
     later = sum(round(float(word.removeprefix("later=")) * 1e9) for word in more if word.startswith("later="))
@@ -140,7 +140,8 @@ def source(rate_text: str, duration_text: str, *more: str) -> None:
         if left > 0.0:
             time.sleep(left)
         for number, publisher in enumerate(publishers):
-            place = 200 * number + k % 200
+            is_stuck = "stuck" in more and number == 1 and k > 5 * rate
+            place = 200 * number + (0 if is_stuck else k % 200)
             stamp = (start + round(k / rate * 1e9) if "even" in more else time.time_ns()) + later
             data = templates[place]
             data[4:12] = (stamp // 10**9).to_bytes(4, "little") + (stamp % 10**9).to_bytes(4, "little")

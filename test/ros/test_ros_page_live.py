@@ -73,7 +73,7 @@ def test_the_page_shows_what_the_topics_say_and_marks_it(spawn: Callable[..., An
     spawn_node().wait_for("active;")
     monitor = spawn("boom_twin.cli.main", "monitor", "--port", "0", "--allow", "mark")
     url = monitor.wait_for("open http").split("open ")[1].split()[0]
-    command = [sys.executable, str(LIVE), "source", "200", "1e4", "imu"]
+    command = [sys.executable, str(LIVE), "source", "200", "1e4", "imu", "stuck"]
     with sync_api.sync_playwright() as playwright, subprocess.Popen(command, stdout=subprocess.DEVNULL) as source:
         browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
         try:
@@ -106,7 +106,7 @@ def shows_what_was_said(page: Any, witness: Witness) -> None:
         lamps = {row[1].strip(): (row[2], row[3].strip()) for row in rows}
         newest = [{each.name.partition(": ")[2]: each for each in msg.status} for msg in witness.diagnostics[-4:]]
         judged = {alarm.channel for msg in witness.health[-4:] for alarm in decode_health(msg)}
-        return bool(lamps) and all(
+        return bool(lamps and judged) and all(
             name in judged
             or any(
                 name in each and level.endswith(LEVELS[each[name].level[0]].name) and words == each[name].message
