@@ -137,7 +137,7 @@ def start_rest(p, f, x, covariance, loads, zero2):
     n, m, size, zero = p.drives.shape[0], p.modes[0], all_states(p), zero_place(p)
     load, drive = force_place(p), drive_place(p)
     for i in range(n):
-        f.jerk[i], f.pulls[i] = 0.0, p.pulled[i]
+        f.jerk[i] = 0.0
     first_variances(p, f, f.gain)
     for i in range(size):
         x[i] = 0.0

@@ -71,7 +71,7 @@ def start_models(p, f, speed, swing):
     n, m, size = p.drives.shape[0], p.modes[0], all_states(p)
     load, drive = force_place(p), drive_place(p)
     noise, x, covariance = f.noise, f.x[VALVES], f.p[VALVES]
-    f.x[:], f.p[:] = 0.0, 0.0
+    f.x[:], f.p[:] = 0.0, 0.0  # of the estimate's models too: a share of 0 of what is not a number would not be 0
     f.load2[:] = noise.usual_load * noise.usual_load
     for a in range(2):
         covariance[load + a, load + a] = f.load2[0, a]

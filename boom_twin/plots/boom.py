@@ -98,7 +98,8 @@ def joint_ranges_picture(path: Path, scene: Scene, name: str) -> Path:
     count = len(scene.joints)
     rows = -(-count // COLUMNS)
     columns = -(-count // rows)
-    with picture(path, f"{name}: all pins over the range of each joint", NOTE, (min(12.0 * columns, 18.0), 8.0 * rows)) as figure:
+    size = min(12.0 * columns, 18.0), 8.0 * rows
+    with picture(path, f"{name}: all pins over the range of each joint", NOTE, size) as figure:
         grid = figure.add_gridspec(2 * rows, columns, height_ratios=[3.0, 1.0] * rows)
         for i in range(count):
             row, column = divmod(i, columns)

@@ -106,8 +106,8 @@ def echo_on_events() -> None:
 def source(rate_text: str, duration_text: str, *more: str) -> None:
     """Send, once it has been found; prints a line when it begins, and the stamps of the strokes.
 
-    More words: ``imu`` sends that too, ``stuck`` repeats one reading of the angles from the fifth second on, ``later=S`` stamps by a clock that is ahead by so many seconds, ``even`` stamps with the
-    time when a message was due, as a rig that samples by its own clock, not with that of sending.
+    More words: ``imu`` sends that too, ``stuck`` repeats one reading of the angles after 5 s, ``later=S`` stamps by a clock
+    that is ahead by so many seconds, ``even`` stamps with the time when a message was due, as a rig with its own clock does.
     """
     later = sum(round(float(word.removeprefix("later=")) * 1e9) for word in more if word.startswith("later="))
     rate, duration = float(rate_text), float(duration_text)

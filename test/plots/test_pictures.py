@@ -68,7 +68,7 @@ def test_it_is_drawn_for_any_number_of_joints(tmp_path: Path, count: int) -> Non
     update = {"sections": scene.sections[:count], "joints": scene.joints[:count], "postures": postures}
     paths = [tmp_path / "pins.png", tmp_path / "again.png"]
     image, _ = (pixels(joint_ranges_picture(path, scene.model_copy(update=update), "boom")) for path in paths)
-    assert image.shape == ({1: 800, 4: 1600}[count], {1: 1200, 4: 1800}[count], 3) and paths[0].read_bytes() == paths[1].read_bytes()
+    assert image.shape == {1: (800, 1200, 3), 4: (1600, 1800, 3)}[count] and paths[0].read_bytes() == paths[1].read_bytes()
     assert ((image.max(axis=2) - image.min(axis=2)) > 0.3).mean() > 0.005, "nothing coloured was drawn"
 
 
