@@ -52,6 +52,19 @@ def test_beams_are_split_at_pins(seed):
     assert lengths == pytest.approx([b - a for a, b in parts], rel=1e-12)
 
 
+def test_a_rigid_section_leaves_the_parts_of_the_others():
+    def parts(*rigid: int) -> list:
+        scene = load_scene()
+        sections = [each.model_copy(update={"modes": 0}) if i in rigid else each for i, each in enumerate(scene.sections)]
+        scene = scene.model_copy(update={"sections": sections})
+        return [flexible_parts(scene, i) for i in range(4)]
+
+    everywhere = parts()
+    for rigid in ([0], [1, 3], [0, 2]):
+        assert parts(*rigid) == [() if i in rigid else part for i, part in enumerate(everywhere)]
+    assert [len(part) for part in parts(0, 1, 2)] == [0, 0, 0, 3]  # as few would not reach the sixth frequency
+
+
 def scene_points(weights):
     """Row of the output end: the last one that is not padding."""
     return np.flatnonzero(np.abs(weights).sum(axis=1) > 0.0)[-1]
