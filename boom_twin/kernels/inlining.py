@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
+from llvmlite.binding import create_pass_builder, create_pipeline_tuning_options
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-LEVEL = 1  # of optimisation; above it compiling takes longer, and steps as long (loops are vectorised at each)
+LEVEL = 1  # of optimisation; above it compiling takes longer, and steps as long
 
 
 class Callee(NamedTuple):
@@ -37,13 +38,16 @@ class KernelCode(JITCodeLibrary):
         ll_module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
-        """Run one pipeline over the module.
+        """Run one pipeline over the module: loops are vectorised, but not unrolled, for they run three to twenty times.
 
         numba has three: each function at level 3, all of them for pruning reference counts, of which kernels have none, and
-        level 3 again. They took a fifth of compiling and made no kernel quicker.
+        level 3 again. They made no kernel quicker.
         """
-        passes, builder = self._codegen._module_pass_manager(opt=LEVEL, loop_vectorize=True, slp_vectorize=False)
-        passes.run(self._final_module, builder)
+        tuning = create_pipeline_tuning_options(speed_level=LEVEL)
+        tuning.loop_vectorization, tuning.slp_vectorization = True, False
+        tuning.loop_unrolling = tuning.loop_interleaving = False
+        builder = create_pass_builder(self._codegen._tm, tuning)
+        builder.getModulePassManager().run(self._final_module, builder)
 
     def add_linking_library(self, library: Any) -> None:
         """Copy a function's code into this one, unless it is a kernel's."""

@@ -223,25 +223,6 @@ class _Intrinsic:
 _copy_fields = _Intrinsic(".references", "copy_fields", lambda fields, room: 0)
 
 
-class StackArray:
-    """A small array of constant shape that a kernel makes, not filled, of the same kind of numbers as its argument.
-
-    For shapes that are constants only, where all loops over it are unrolled; see `boom_twin.kernels.stack_arrays`.
-    """
-
-    def __init__(self, *shape: int) -> None:
-        self._shape = shape
-
-    def __call__(self, like: Any) -> Any:
-        return np.zeros(self._shape, like.dtype)
-
-    @cached_property
-    def _numba_type_(self) -> Any:
-        from .stack_arrays import type_of_maker
-
-        return type_of_maker(self._shape)
-
-
 def kernel(function: Callable[..., Any]) -> Kernel:
     """Compile `function`: nopython, cached on disk, without the interpreter's lock, no exceptions for division."""
     return Kernel(function)

@@ -13,7 +13,6 @@ from ..analysis.modal import natural_modes
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..errors import SolverError
-from ..kernels.elements.beam import USUAL
 from ..scene.kinematics import posture_angles, strokes_of_posture
 from ..scene.schema import Scene
 from ..types import Array
@@ -106,7 +105,6 @@ def deviation(model: Response, full: Response, course: StrokeCourse) -> Deviatio
 
 # In unknowns, measured on the default boom:
 AXIAL = 0.35  # an axial coordinate; other unknowns count as one
-OTHER = 0.6  # more for a flexible part that has not the usual shapes, for which the kernels have code of their own
 
 STEPS = 400  # that are timed
 
@@ -121,9 +119,8 @@ def size(scene: Scene) -> float:
     coordinate_cost = 0.05  # a coordinate of a mass, or a point that turns finitely
     plan = compile_scene(scene)
     unknowns, beams = len(plan.names), plan.tables.beams
-    other = np.sum((beams.bending != USUAL.bending) | (beams.axial != USUAL.axial))
     shares = len(plan.masses) - unknowns + beams.finite.sum()
-    return float(unknowns - (1.0 - AXIAL) * beams.axial.sum() + OTHER * other + coordinate_cost * shares)
+    return float(unknowns - (1.0 - AXIAL) * beams.axial.sum() + coordinate_cost * shares)
 
 
 def step_times(scenes: Sequence[Scene], course: StrokeCourse, rounds: int) -> Array:

@@ -134,7 +134,7 @@ def placed(z, row):
     rho, drho = np.zeros((POINTS + 1, 2)), np.zeros((POINTS + 1, COUNT + 1, 2))
     part = beam.BeamPart(*TABLES, rho, drho, turn=np.zeros((beam.TURN_ROWS, POINTS + 1)))
     position, c, s = np.zeros(COUNT + 1 + 3 * POINTS), np.cos(z[2]), np.sin(z[2])
-    angle = beam.place_beam(row, part, SIZES, z[3:], *z[:3], c, s, position, part.turn, part.rho)
+    angle = beam.place_beam(row, part, SIZES, z[3:], *z[:3], c, s, position)
     end = z[:2] + np.array([[c, -s], [s, c]]) @ rho[-1]
     return np.append(end, z[2] + angle), position, part
 

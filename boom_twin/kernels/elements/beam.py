@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...types import Array
-from ..jit import StackArray, inner
+from ..jit import inner
 from ..plane_algebra import COS, SIN, cosine_and_sine, cosines
 
 BEAM = np.dtype(
@@ -41,7 +41,7 @@ D_COS, D_SIN, ANGLE, TURN_ROWS = 2, 3, 4, 5  # rows of `BeamPart.turn`, behind C
 
 
 class Sizes(NamedTuple):
-    """Loop counts of a part, as the row has them: bending, axial, points."""
+    """Loop counts of a part, as the row has them: bending, axial, points. As numbers they need no load in a loop."""
 
     bending: np.int64
     axial: np.int64
@@ -61,20 +61,10 @@ class BeamPart(NamedTuple):
     turn: Array  # (TURN_ROWS, P+1), cosine, sine, their derivatives by the angle (not of the output end), angle
 
 
-USUAL = Sizes(np.int64(3), np.int64(1), np.int64(4))  # as constants, which the compiler unrolls
-USUAL_TURN, USUAL_RHO = StackArray(TURN_ROWS, 5), StackArray(5, 2)
-
-
 @inner
-def is_usual(row):
-    """Return True if a part has the usual sizes."""
-    return row.bending == USUAL.bending and row.axial == USUAL.axial and row.points == USUAL.points
-
-
-@inner
-def turn_points(row, part, sizes, q, turn):
-    """Fill `turn`, see `BeamPart`; returns the end's turn (rad)."""
-    psi, end = part.psi, sizes.points
+def turn_points(row, part, sizes, q):
+    """Fill the part's `turn`; returns the end's turn (rad)."""
+    psi, turn, end = part.psi, part.turn, sizes.points
     for j in range(end + 1):
         angle = 0.0
         for k in range(sizes.bending):
@@ -98,11 +88,11 @@ def stretch_of(sizes, q):
 
 
 @inner
-def beam_shape(row, part, sizes, z, turn, rho):
-    """Fill `turn` and `rho`, see `BeamPart`, from the unknowns z; returns the end's turn (rad)."""
+def beam_shape(row, part, sizes, z):
+    """Fill the part's `turn` and `rho` from the unknowns z; returns the end's turn (rad)."""
     q = z[row.z : row.z + row.bending + row.axial]
-    weights, stretch = part.weights, stretch_of(sizes, q)
-    end = turn_points(row, part, sizes, q, turn)
+    weights, turn, rho, stretch = part.weights, part.turn, part.rho, stretch_of(sizes, q)
+    end = turn_points(row, part, sizes, q)
     for i in range(sizes.points + 1):
         x, y = 0.0, 0.0
         for j in range(sizes.points):
@@ -134,22 +124,17 @@ def point_on_axis(row, part_psi, z, psi, weights):
 
 
 @inner
-def place_beam(row, part, sizes, z, x, y, theta, c, s, position, turn, rho):
+def place_beam(row, part, sizes, z, x, y, theta, c, s, position):
     """Shape and place a part whose input end is at (x, y), turned by theta (cosine c, sine s); return the end's turn (rad).
 
-    Writes the part's `turn` and `rho`, and into `position` the points, and the angles there if there is rotary inertia. The
-    arguments `turn` and `rho` are room for them while they are worked out: the part's own, or on the stack.
+    Writes the part's `turn` and `rho`, and into `position` the points, and the angles there if there is rotary inertia.
     """
-    end, points = beam_shape(row, part, sizes, z, turn, rho), position[row.history : row.history + 2 * row.points + row.rotary]
+    end, points = beam_shape(row, part, sizes, z), position[row.history : row.history + 2 * row.points + row.rotary]
+    turn, rho = part.turn, part.rho
     for i in range(sizes.points):
         points[2 * i] = x + c * rho[i, 0] - s * rho[i, 1]
         points[2 * i + 1] = y + s * rho[i, 0] + c * rho[i, 1]
     if row.rotary:
         for i in range(sizes.points):
             points[2 * sizes.points + i] = theta + turn[ANGLE, i]
-    for i in range(sizes.points + 1):
-        part.rho[i, 0], part.rho[i, 1] = rho[i, 0], rho[i, 1]
-    for k in range(TURN_ROWS):
-        for j in range(sizes.points + 1):
-            part.turn[k, j] = turn[k, j]
     return end

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ...types import Array
-from ..jit import StackArray, inner
+from ..jit import inner
 from ..plane_algebra import COS, SIN, condense, condense_forces
 from .beam import D_COS, D_SIN, stretch_of
 
@@ -26,9 +26,6 @@ class BeamEquations(NamedTuple):
     block: Array  # (>= n + axial, ..), H_qq, lower triangle
     force: Array  # (>= n + axial,), g_q
     local: Array
-
-
-USUAL_LOCAL = StackArray(LOCAL_ROWS, 4)
 
 
 @inner

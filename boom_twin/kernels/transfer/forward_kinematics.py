@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..elements.beam import USUAL, USUAL_RHO, USUAL_TURN, BeamPart, Sizes, is_usual, place_beam
+from ..elements.beam import BeamPart, Sizes, place_beam
 from ..elements.cylinder import END_C, END_R, near, place_cylinder
 from ..elements.linkage import LINK_L
 from ..elements.pin_contact import BARREL_END_PIN, LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD_END_PIN
@@ -138,11 +138,8 @@ def place(t, state, work):
         put_frame(frames[k], x, y, theta, c, s)
         if kind == BEAM:
             beam, part = t.beams[row], beam_part(t, work, row)
-            if is_usual(beam):
-                end = place_beam(beam, part, USUAL, z, x, y, theta, c, s, position, USUAL_TURN(z), USUAL_RHO(z))
-            else:
-                sizes = Sizes(beam.bending, beam.axial, beam.points)
-                end = place_beam(beam, part, sizes, z, x, y, theta, c, s, position, part.turn, part.rho)
+            sizes = Sizes(beam.bending, beam.axial, beam.points)
+            end = place_beam(beam, part, sizes, z, x, y, theta, c, s, position)
             bx, by = part.rho[beam.points, 0], part.rho[beam.points, 1]
             x, y, theta = x + c * bx - s * by, y + s * bx + c * by, theta + end
             c, s = rotated(c, s, part.turn[COS, beam.points], part.turn[SIN, beam.points])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..elements.beam import USUAL, Sizes, is_usual
-from ..elements.beam_equations import USUAL_LOCAL, BeamEquations, transfer_beam
+from ..elements.beam import Sizes
+from ..elements.beam_equations import BeamEquations, transfer_beam
 from ..elements.pin_contact import BARREL_END_PIN
 from ..elements.rigid_body import add_body_force, add_body_tangent, merge_outlet, pull_back
 from ..jit import inner, kernel
@@ -52,9 +52,6 @@ def beam_operation(t, state, work, motion, row, operation, c, sn, m):
     """Transfer the cut through beam part `row` and keep its gains. Return the number of negative pivots or -1."""
     beam, part, s, p = t.beams[row], beam_part(t, work, row), work.s, work.p
     gains, factors, free = work.condensed.gains[operation], work.condensed.factors[operation], work.condensed.free[operation]
-    if is_usual(beam):
-        own = BeamEquations(gains, factors, free, USUAL_LOCAL(p))
-        return transfer_beam(beam, part, USUAL, own, state.z, c, sn, motion, t.gravity, work.position, s, p, m)
     own, sizes = BeamEquations(gains, factors, free, work.local), Sizes(beam.bending, beam.axial, beam.points)
     return transfer_beam(beam, part, sizes, own, state.z, c, sn, motion, t.gravity, work.position, s, p, m)
 
