@@ -18,7 +18,7 @@ from ..deviation.posture import locate
 from ..deviation.sensor_model import mounting_of
 from ..errors import BoomTwinError
 from ..scene.edit import with_rigid_cylinders
-from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes
+from ..scene.kinematics import RigidJoints, gravity_in_base
 from ..scene.schema import Scene
 from ..types import NANO, NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading
 
@@ -208,7 +208,7 @@ class RestModel:
     """Model of a scene, with its load, at rest; `reads` is what the strokes are. For `places` see `boom_twin.Twin`."""
 
     def __init__(self, scene: Scene, reads: StrokeReading, places: Mapping[str, Place] = NO_PLACES) -> None:
-        self.scene = scene
+        self.scene, self._joints = scene, RigidJoints(scene)
         self._plan = compile_scene(with_rigid_cylinders(scene) if reads is StrokeReading.LENGTH else scene)
         self._state, self._work = self._plan.state(), self._plan.work()
         joints = self._plan.joints
@@ -237,7 +237,7 @@ class RestModel:
     def _at_rest(self, strokes: Array) -> Array:
         """Return joint angles, inclinations (root, head), forces, and angles of IMUs; NaN if there is no posture."""
         try:
-            near = joint_angles_of_strokes(self.scene, strokes)
+            near = self._joints.angles(strokes)
             settle(self._plan, self._state, self._work, strokes, near)
         except BoomTwinError:
             return np.full(4 * len(strokes) + len(self._imus), np.nan)
