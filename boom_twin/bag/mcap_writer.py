@@ -171,10 +171,9 @@ class McapWriter:
         length, offsets = len(written), {}
         for channel, entries in chunk.entries.items():
             offsets[channel] = start + len(written)
-            size = len(entries) * _INDEX_ENTRY.size
-            written += PREFIX.pack(Opcode.MESSAGE_INDEX, _INDEX_HEAD.size + size) + _INDEX_HEAD.pack(channel, size)
-            written += b"".join(entries)
-            self._counts[channel] += len(entries)
+            size = len(entries)
+            written += PREFIX.pack(Opcode.MESSAGE_INDEX, _INDEX_HEAD.size + size) + _INDEX_HEAD.pack(channel, size) + entries
+            self._counts[channel] += size // _INDEX_ENTRY.size
         self._stream.write(written)
         self._chunk_count += 1
         self._span = min(self._span[0], chunk.start), max(self._span[1], chunk.end)
@@ -198,27 +197,28 @@ class _OpenChunk:
 
     Attributes
     ----------
-    entries : dict of int to list of bytes
+    entries : dict of int to bytearray
         Index entries (log time and place of every message) by channel, in the order of their first messages.
     """
 
     def __init__(self) -> None:
         self.content = bytearray()  # the records
-        self.entries: dict[int, list[bytes]] = {}
+        self.entries: dict[int, bytearray] = {}
         self.start = self.end = 0  # first and last log time, ns
 
     def add(self, channel: int, log_time: int, record: bytes) -> None:
         """Append one message."""
         self._extend_span(log_time, log_time)
-        self.entries.setdefault(channel, []).append(_INDEX_ENTRY.pack(log_time, len(self.content)))
+        self.entries.setdefault(channel, bytearray()).extend(_INDEX_ENTRY.pack(log_time, len(self.content)))
         self.content += record
 
     def add_block(self, channels: Integers, log_times: Integers, places: Integers, records: memoryview) -> None:
         """Append one or more messages whose records begin at `places` in `records`."""
         self._extend_span(int(log_times.min()), int(log_times.max()))
-        entries = np.column_stack([log_times, places + len(self.content)]).astype("<u8").view(f"V{_INDEX_ENTRY.size}")
-        for channel, entry in zip(channels.tolist(), entries[:, 0].tolist(), strict=True):
-            self.entries.setdefault(channel, []).append(entry)
+        entries = np.column_stack([log_times, places + len(self.content)]).astype("<u8")
+        kinds, firsts = np.unique(channels, return_index=True)
+        for channel in kinds[np.argsort(firsts)].tolist():
+            self.entries.setdefault(channel, bytearray()).extend(entries[channels == channel].tobytes())
         self.content += records
 
     def _extend_span(self, start: int, end: int) -> None:

@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..deviation.estimate_row import FORCE_VARIANCE, MODES
+from ..kernels.jit import SameTypes
+from ..kernels.tip_joints import write_derived
 from ..predictions import Estimate, Prediction
 from ..twin.blocks import EstimateBlock, Integers, PredictionBlock, row_of
 from ..types import Array
@@ -123,6 +125,9 @@ class Chain(NamedTuple):
     lengths: Array
 
 
+_DERIVE = SameTypes(write_derived)
+
+
 def number_rows(chain: Chain, p: Prediction | PredictionBlock | None, e: Estimate | EstimateBlock | None, count: int) -> Array:
     """Return the numbers of `count` predictions and their estimates, shape (count, all); NaN if missing."""
     joints = len(chain.lengths)
@@ -136,33 +141,8 @@ def number_rows(chain: Chain, p: Prediction | PredictionBlock | None, e: Estimat
     if e is not None:
         rows = e.rows if isinstance(e, EstimateBlock) else row_of(e)[np.newaxis]
         numbers[:, at + 3 : -2] = rows[:, :FORCE_VARIANCE]
-    lengths, (x0, y0) = chain.lengths.tolist(), chain.pivot.tolist()
-    sections = slice(JOINTS, JOINTS + joints)
-    derived = [_derived(lengths, x0, y0, row[:3], row[sections], row[at + 5]) for row in numbers.tolist()]
-    numbers[:, [at, at + 1, at + 2, -2, -1]] = np.reshape(derived, (count, 5))
+    _DERIVE(chain.pivot, chain.lengths, numbers, JOINTS, at)
+    derived = numbers[:, [at, at + 1, at + 2, -2, -1]]
+    derived[np.isnan(derived)] = math.nan  # the processor decides which of two NaN a sum has
+    numbers[:, [at, at + 1, at + 2, -2, -1]] = derived
     return numbers
-
-
-def _derived(
-    lengths: list[float], x0: float, y0: float, tip: list[float], joints: list[float], estimated: float
-) -> tuple[float, ...]:
-    """Return the joints of the tip (m, m, rad), and sine and cosine of half the angle (rad) of the estimate.
-
-    The deflected tip is x, y (m), angle (rad). Every NaN is `math.nan`, because the processor decides which of two NaN a sum
-    has.
-    """
-    angle, x, y = 0.0, 0.0, 0.0
-    along = across = math.nan
-    for length, joint in zip(lengths, joints, strict=True):
-        angle += joint
-        along, across = _turn(angle)
-        x, y = x + length * along, y + length * across
-    dx, dy = tip[0] - (x0 + x), tip[1] - (y0 + y)
-    cosine, sine = _turn(0.5 * estimated)
-    derived = along * dx + across * dy, along * dy - across * dx, tip[2] - angle, sine, cosine
-    return derived if all(each == each for each in derived) else tuple(each if each == each else math.nan for each in derived)
-
-
-def _turn(angle: float) -> tuple[float, float]:
-    """Return cosine and sine of an angle (rad) by the C library, for the same bits on every processor; NaN of infinity."""
-    return (math.cos(angle), math.sin(angle)) if math.isfinite(angle) else (math.nan, math.nan)

@@ -217,8 +217,9 @@ class ReportEncoder:
         self._channels = channels_of(count)
         self._residuals: dict[tuple[str, ...], Template] = {}
         self._markers = ShapeMarkers(settings.exaggeration, settings.force_scale, frame)
-        for output in Output:  # their encoders are compiled here, not when the first message waits
+        for output in Output:  # encoders and the kernel are compiled here, not when the first message waits
             jazzy().get_msgdef(type_of(output))
+        number_rows(self._chain, None, None, 1)
 
     def fill(self, report: Report, is_wanted: Callable[[Output], bool] = lambda output: True) -> Messages:
         """Return the messages of one report.

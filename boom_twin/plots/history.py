@@ -161,13 +161,13 @@ class ExtremeRows:
 
     def _take_away(self, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Remove rows with the present width of bins; return which of the rows that are left are kept anyhow."""
-        stays = kept | _extremes(self._numbers // self._width, [self.columns[key] for key in self._keys])
+        stays = kept | extremes(self._numbers // self._width, [self.columns[key] for key in self._keys])
         self._numbers = self._numbers[stays]
         self.columns = {name: column[stays] for name, column in self.columns.items()}
         return kept[stays]
 
 
-def _extremes(bins: NDArray[np.int64], keys: Sequence[Array]) -> NDArray[np.bool_]:
+def extremes(bins: NDArray[np.int64], keys: Sequence[Array]) -> NDArray[np.bool_]:
     """Return True for the first rows with the least or the largest value of a key in their bin; NaN is no value.
 
     `bins` (k,) ascend; keys have the shape (k,) or (k, c).

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..analysis.sample_series import SEGMENT, ColumnStatistics, power_density, spacing, unbroken
 from ..types import Array, sensor_kind
-from .history import Density, History, ResidualDistribution, SessionDistributions
+from .history import Density, History, ResidualDistribution, SessionDistributions, extremes
 from .style import BLUE, GREY, INK, ORANGE, PURPLE, SKY, TIME, extent, legend_above, picture, shade_alarms, shade_gaps
 
 if TYPE_CHECKING:
@@ -124,18 +124,19 @@ def residual_picture(path: Path, session: str, history: History, note: str) -> N
     channels, found = len(history.residual_names), distributions_of(history).residuals
     height = max(9.0, 1.2 + 1.5 * channels)
     with picture(path, f"{session}: residuals, measured minus predicted", note, (16.0, height)) as figure:
-        panels = figure.subplots(channels, 2, squeeze=False, sharex="col", gridspec_kw={"width_ratios": [5.0, 1.0]})
-        for channel, (over_time, spread) in enumerate(panels):
-            own = found[history.residual_names[channel]]
-            _channel(over_time, history, channel, own.reach)
-            _distribution(spread, own)
-        panels[-1, 0].set_xlabel(TIME)
-        panels[-1, 1].set_xlabel(f"residual / {SIGMA}")
-        panels[0, 1].set_title("against the unit normal")
-        legend_above(panels[0, 0], 5, handlelength=1.4, markerscale=4)
+        grid = figure.add_gridspec(channels, 2, width_ratios=[5.0, 1.0])
+        panels: list[Axes] = []
+        for channel, name in enumerate(history.residual_names):
+            panels.append(figure.add_subplot(grid[channel, 0], sharex=panels[0] if panels else None))
+            panels[-1].tick_params(labelbottom=channel == channels - 1)
+            _channel(panels[-1], history, channel, found[name].reach)
+        panels[-1].set_xlabel(TIME)
+        legend_above(panels[0], 5, handlelength=1.4, markerscale=4)
+        _distributions(figure.add_subplot(grid[:, 1]), [found[name] for name in history.residual_names])
 
 
 def _channel(axes: Axes, history: History, channel: int, reach: float) -> None:
+    bins = 1000.0  # of time, in which curves are drawn by their extremes: one and a half pixels each
     name = history.residual_names[channel]
     factor, unit = sensor_kind(name).shown_unit
     measured = np.isfinite(history.residual_values[:, channel]) & np.isfinite(history.residual_sigmas[:, channel])
@@ -149,11 +150,14 @@ def _channel(axes: Axes, history: History, channel: int, reach: float) -> None:
     if not stamps.size:
         axes.text(0.5, 0.5, "no samples", transform=axes.transAxes, ha="center", va="center", color=GREY)
         return
-    axes.fill_between(stamps, -3 * sigma, 3 * sigma, color=SKY, alpha=0.22, linewidth=0, label=f"±3 {SIGMA} expected")
+    means, places = factor * history.residual_means[measured, channel], (stamps - stamps[0]) / max(stamps[-1] - stamps[0], 1e-9)
+    few = extremes((bins * places).astype(np.int64), [sigma, means])
+    at, sigma = stamps[few], sigma[few]
+    axes.fill_between(at, -3 * sigma, 3 * sigma, color=SKY, alpha=0.22, linewidth=0, label=f"±3 {SIGMA} expected")
     axes.plot(stamps, values, ".", color=BLUE, markersize=2.6, alpha=0.55, markeredgewidth=0, label="residual")
-    axes.plot(stamps, sigma, color=INK, linewidth=1.0, label=f"±1 {SIGMA}")
-    axes.plot(stamps, -sigma, color=INK, linewidth=1.0)
-    axes.plot(stamps, factor * history.residual_means[measured, channel], color=ORANGE, linewidth=1.6, label="mean over 1 s")
+    axes.plot(at, sigma, color=INK, linewidth=1.0, label=f"±1 {SIGMA}")
+    axes.plot(at, -sigma, color=INK, linewidth=1.0)
+    axes.plot(at, means[few], color=ORANGE, linewidth=1.6, label="mean over 1 s")
     axes.set_ylim(-factor * reach, factor * reach)
     axes.set_xlim(extent(stamps))
 
@@ -166,17 +170,25 @@ def running_mean(stamps: Array, values: Array, over: float = 1.0) -> Array:
     return np.asarray(((total[last] - total[first]).T / np.maximum(last - first, 1)).T)
 
 
-def _distribution(axes: Axes, found: ResidualDistribution) -> None:
-    axes.plot(EDGES, np.exp(-0.5 * EDGES**2) / np.sqrt(2.0 * np.pi), color=INK, linewidth=1.2)
+def _distributions(axes: Axes, found: list[ResidualDistribution]) -> None:
+    """Draw the distributions of all channels, each beside its residuals."""
+    gap, normal = 0.12, np.exp(-0.5 * EDGES**2) / np.sqrt(2.0 * np.pi)  # gap between two channels, relative to their distance
+    for foot, own in zip(range(len(found))[::-1], found, strict=True):
+        density = own.counts / (max(own.counts.sum(), 1) * np.diff(EDGES))
+        scale = 0.95 * (1.0 - gap) / max(density.max(), normal.max())
+        axes.plot(EDGES, foot + scale * normal, color=INK, linewidth=1.2)
+        if own.mean is not None:
+            axes.stairs(foot + scale * density, EDGES, baseline=foot, fill=True, color=SKY, alpha=0.8, linewidth=0)
+            text = f"mean {own.mean:+.2f}\nsd {own.deviation:.2f}"
+            axes.text(0.98 * EDGES[-1], foot + 0.97 * (1.0 - gap), text, ha="right", va="top", fontsize=11, color=INK)
+    axes.set_title("against the unit normal")
+    axes.set_xlabel(f"residual / {SIGMA}")
     axes.set_xlim(EDGES[0], EDGES[-1])
     axes.set_xticks([-3, 0, 3])
-    axes.set_yticks([])
+    axes.set_ylim(0.0, len(found) - gap)
+    axes.set_yticks(range(len(found)), [""] * len(found))
+    axes.tick_params("y", length=0)
     axes.spines["left"].set_visible(False)
-    if found.mean is not None:
-        density = found.counts / (found.counts.sum() * np.diff(EDGES))
-        axes.stairs(density, EDGES, fill=True, color=SKY, alpha=0.8, linewidth=0)
-        text = f"mean {found.mean:+.2f}\nsd {found.deviation:.2f}"
-        axes.text(0.98, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=11, color=INK)
 
 
 def spectrum_picture(path: Path, session: str, history: History, note: str) -> None:

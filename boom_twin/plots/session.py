@@ -57,8 +57,6 @@ def replay_pictures(
     is_drawn = {tip: True, residuals: history.residual_names, posture: history.shapes, spectrum: has_spectrum(history)}
 
     def draw_half() -> None:
-        if is_drawn[posture]:
-            posture_picture(posture, session, history, note)
         tip_picture(tip, session, history, truth, note)
         if is_drawn[spectrum]:
             spectrum_picture(spectrum, session, history, note)
@@ -66,6 +64,8 @@ def replay_pictures(
     with beside(draw_half):
         if is_drawn[residuals]:
             residual_picture(residuals, session, history, note)
+        if is_drawn[posture]:
+            posture_picture(posture, session, history, note)
     return [path for path, is_there in is_drawn.items() if is_there]
 
 

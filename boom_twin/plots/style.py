@@ -54,6 +54,8 @@ LOOK = {
     "legend.fontsize": 12,
     "lines.linewidth": 1.3,
     "agg.path.chunksize": 20000,
+    "figure.subplot.left": 0.06,
+    "figure.subplot.right": 0.99,
     "date.converter": "concise",
 }
 
@@ -97,11 +99,9 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
 
 
 def _part_titles_and_legends(figure: Any) -> None:
-    """Raise every title that a legend would cover above that legend."""
+    """Raise every title that a legend would cover above that legend, by the widths before the layout."""
     from matplotlib.text import Text
 
-    figure.get_layout_engine().execute(figure)
-    has_moved = False
     for axes in figure.axes:
         legend, text = axes.get_legend(), axes.get_title(loc="left")
         titles = [each for each in axes.get_children() if isinstance(each, Text) and text and each.get_text() == text]
@@ -109,9 +109,6 @@ def _part_titles_and_legends(figure: Any) -> None:
         for title in titles:
             if box is not None and box.overlaps(title.get_window_extent()):
                 axes.set_title(text, loc="left", pad=6.0 + 72.0 / DPI * (box.y1 - axes.get_window_extent().y1))
-                has_moved = True
-    if not has_moved:
-        figure.set_layout_engine("none")  # the layout is known
 
 
 def shade_gaps(axes: Axes, gaps: list[tuple[float, float]]) -> None:

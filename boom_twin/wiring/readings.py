@@ -18,7 +18,7 @@ from ..deviation.posture import locate
 from ..deviation.sensor_model import mounting_of
 from ..errors import BoomTwinError
 from ..scene.edit import with_rigid_cylinders
-from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes
+from ..scene.kinematics import RigidJoints, gravity_in_base
 from ..scene.schema import Scene
 from ..types import NANO, NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading
 
@@ -147,7 +147,7 @@ def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, guess: flo
     for _ in range(round(2.0 * LONGEST / COARSE)):
         left, slopes = at_zero if lag == 0.0 else residuals.left(lag)
         sizes = _sizes(left)
-        by, weight = (residuals.summed(np.nan_to_num(each / sizes)).sum(axis=1) for each in (-left * slopes, slopes**2))
+        by, weight = residuals.summed(np.nan_to_num(np.array([-left * slopes, slopes**2]) / sizes)).sum(axis=-1)
         if not weight.sum() > 0.0 or weight.sum() ** 2 < FEWEST * (weight**2).sum():
             return Lag(0.0, math.inf)
         change = float(by.sum() / weight.sum())
@@ -174,26 +174,25 @@ class _Residuals:
     def __init__(self, stamps: NDArray[np.int64], read: Array, expected: Array) -> None:
         self._times, self._read = (stamps - stamps[0]) * NANO, read
         self._starts = np.flatnonzero(np.diff(self._times // SPAN, prepend=-1.0))
+        self._sizes = np.diff(self._starts, append=len(stamps))
         self._expected = np.stack([expected, np.gradient(expected, self._times, axis=0)])
 
     def summed(self, values: Array) -> Array:
-        """Return the sums of values (k, channels) over every span."""
-        return np.asarray(np.add.reduceat(values, self._starts, axis=0))
+        """Return the sums of values (.., k, channels) over every span."""
+        return np.asarray(np.add.reduceat(values, self._starts, axis=-2))
 
-    def left(self, lag: float) -> tuple[Array, Array]:
-        """Return residuals to the readings expected `lag` s before, and their rates."""
-        times, then = self._times, self._times - lag
-        before = np.clip(np.searchsorted(times, then) - 1, 0, len(times) - 2)
-        share = ((then - times[before]) / (times[before + 1] - times[before]))[:, None]
-        expected, rates = self._expected[:, before] + share * (self._expected[:, before + 1] - self._expected[:, before])
-        left = self._read - expected
-        left[(then < 0.0) | (then > times[-1])] = np.nan
-        return self._less_mean(left), self._less_mean(np.where(np.isfinite(left), rates, np.nan))
-
-    def _less_mean(self, values: Array) -> Array:
-        known = np.isfinite(values)
-        means = self.summed(np.where(known, values, 0.0)) / np.maximum(self.summed(known.astype(float)), 1.0)
-        return np.asarray(values - np.repeat(means, np.diff(self._starts, append=len(values)), axis=0))
+    def left(self, lag: float) -> Array:
+        """Return residuals to the readings expected `lag` s before, and their rates, shape (2, k, channels)."""
+        both, times, then = self._expected.copy(), self._times, self._times - lag
+        if lag:
+            before = np.clip(np.searchsorted(times, then) - 1, 0, len(times) - 2)
+            share = ((then - times[before]) / (times[before + 1] - times[before]))[:, None]
+            both = both[:, before] + share * (both[:, before + 1] - both[:, before])
+        both[0] = self._read - both[0]
+        both[0, (then < 0.0) | (then > times[-1])] = np.nan
+        known = np.isfinite(both[0])
+        means = self.summed(np.where(known, both, 0.0)) / np.maximum(self.summed(known.astype(float)), 1.0)
+        return np.asarray(np.where(known, both, np.nan) - np.repeat(means, self._sizes, axis=1))
 
 
 class Expected(NamedTuple):
@@ -208,7 +207,7 @@ class RestModel:
     """Model of a scene, with its load, at rest; `reads` is what the strokes are. For `places` see `boom_twin.Twin`."""
 
     def __init__(self, scene: Scene, reads: StrokeReading, places: Mapping[str, Place] = NO_PLACES) -> None:
-        self.scene = scene
+        self.scene, self._joints = scene, RigidJoints(scene)
         self._plan = compile_scene(with_rigid_cylinders(scene) if reads is StrokeReading.LENGTH else scene)
         self._state, self._work = self._plan.state(), self._plan.work()
         joints = self._plan.joints
@@ -237,7 +236,7 @@ class RestModel:
     def _at_rest(self, strokes: Array) -> Array:
         """Return joint angles, inclinations (root, head), forces, and angles of IMUs; NaN if there is no posture."""
         try:
-            near = joint_angles_of_strokes(self.scene, strokes)
+            near = self._joints.angles(strokes)
             settle(self._plan, self._state, self._work, strokes, near)
         except BoomTwinError:
             return np.full(4 * len(strokes) + len(self._imus), np.nan)
