@@ -109,7 +109,7 @@ def _springs(scene: Scene) -> list[str]:
 def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
     """Return all single faults that are compared for a boom, without zeros of angles that drive the model.
 
-    Two give no alarm. Warm oil softens all cylinders. The zero of the IMU looks like model errors in fast moves.
+    Warm oil, which softens all cylinders, gives no alarm.
     """
     mass = explain(scene).mass
     found = [Fault(name, "softer", LOSS) for name in parameter_names(scene) if name.endswith((".k", ".EI", ".stiffness"))]
@@ -120,9 +120,7 @@ def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -
             found.append(Fault(cause, "less", size))
     names_of = channels_of(len(scene.joints))
     angles = () if reads is StrokeReading.ANGLE else names_of[Stream.ANGLES]
-    found += [
-        Fault(f"{name}.sensor", "off", is_told=name != "tip_imu") for name in (*angles, "tip_imu", *names_of[Stream.FORCES])
-    ]
+    found += [Fault(f"{name}.sensor", "off") for name in (*angles, "tip_imu", *names_of[Stream.FORCES])]
     streams = dict.fromkeys((reads.stream, Stream.ANGLES, Stream.IMU, Stream.FORCES))
     return [*found, *(Fault(f"{stream.value}.delay", "late", LATE) for stream in streams)]
 
@@ -213,7 +211,7 @@ def evidence_of(fault: Fault, spread: float) -> str:
         return change_text(size, "kg" if fault.cause == "tip.payload" else "kg/m", spread)
     if fault.kind == "late":
         return change_text(1e3 * size, "ms", 1e3 * spread)
-    return change_text(size, sensor_kind(fault.channel).unit, spread)
+    return change_text(size, sensor_kind(fault.channel.replace("tip_imu", "tip_imu_x")).unit, spread)
 
 
 def explains(named: Alarm, stream: Stream, deviation: Alarm) -> bool:

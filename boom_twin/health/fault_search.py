@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from statistics import NormalDist
 from typing import Any, NamedTuple, Protocol
@@ -63,6 +63,9 @@ class Follower(Protocol):
     def zeros(self, channels: Collection[str], /) -> tuple[Array, Array]:
         """Estimated zeros of sensors, and their variances."""
 
+    def doubt(self, channels: Collection[str], /) -> None:
+        """Let the zeros of these sensors drift by any amount."""
+
     def leave_out(self, masked: Flags, strokes: Flags, /) -> None:
         """Leave out measured channels, and strokes."""
 
@@ -114,17 +117,40 @@ class FaultSearch:
         more = [(fault, (*known, fault)) for fault in possible_faults(self._scene, self._reads) if fault.cause not in causes]
         self._faults, self._hypotheses, self._twins = list[Fault](), list[Hypothesis](), list[Follower]()
         for fault, faults in [(None, known), *fewer, *more]:
-            try:
-                each = hypothesis(self._scene, faults)
-                twin = self._made(each)
-                for second in list(self._recent)[-WARM_UP:]:
-                    _feed(twin, each, second)
-                self._twins.append(twin)
-            except BoomTwinError:  # an impossible boom, such as one with a part too soft to hold it
-                continue
-            self._hypotheses.append(each)
-            self._faults += [] if fault is None else [fault]
+            self._add(fault, faults)
         self._decide_anew()
+
+    def _add(self, fault: Fault | None, faults: Sequence[Fault]) -> None:
+        """Add the twin of a hypothesis, which is that of a boom with these faults."""
+        try:
+            each = hypothesis(self._scene, faults)
+            twin = self._made(each)
+            for second in list(self._recent)[-WARM_UP:]:
+                _feed(twin, each, second)
+        except BoomTwinError:  # an impossible boom, such as one with a part too soft to hold it
+            return
+        self._twins.append(twin)
+        self._hypotheses.append(each)
+        self._faults += [] if fault is None else [fault]
+
+    def _believe(self, fault: Fault, place: int = 0) -> None:
+        """Let all twins go on with the zero of a sensor that drifts, or no more; begin anew if the boom itself is another.
+
+        `place` (from 1): of the twin that becomes the one of the boom as believed.
+        """
+        if fault.kind != "off":
+            return self._begin()
+        channels = hypothesis(self._scene, (fault,)).doubted
+        if place:
+            self._twins[0], self._hypotheses[0] = self._twins.pop(place), self._hypotheses.pop(place)
+            del self._faults[place - 1]
+        doubted = [each.doubted | channels if place else each.doubted - channels for each in self._hypotheses]
+        for i, (twin, own) in enumerate(zip(self._twins, doubted, strict=True)):
+            twin.doubt(own)
+            self._hypotheses[i] = self._hypotheses[i]._replace(doubted=own)
+        if not place:
+            self._add(fault._replace(size=0.0), (*self._named, fault))
+        return self._decide_anew()
 
     def _decide_anew(self) -> None:
         """Discard all evidence of faults."""
@@ -190,13 +216,13 @@ class FaultSearch:
         ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
         evidence = evidence_of(sized, spread) if fault.is_told else ""
         alarm = self._named[sized] = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
-        self._begin()
+        self._believe(fault, verdict.place + 1)
         return [alarm] if fault.is_told else []
 
     def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
         """End a named fault at a stamp (ns); return its alarm."""
         alarm = replace(self._named.pop(fault), until=stamp)
-        self._begin()
+        self._believe(fault)
         return [alarm] if fault.is_told else []
 
     def _back_again(self) -> Fault | None:
@@ -260,12 +286,16 @@ class FaultSearch:
         return np.array(found)
 
     def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float]:
-        """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), and the standard deviation."""
-        doubted = hypothesis(self._scene, (fault,)).doubted
-        before: Any = None
-        for stamp, twin in self._repeated(fault):
-            now = twin.zeros(doubted)
-            before = now if before is None or stamp < onset else before
+        """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), and the standard deviation.
+
+        An angle sensor has no zero before, so its change may be older than the evidence.
+        """
+        doubted, before = hypothesis(self._scene, (fault,)).doubted, (np.zeros(1), np.zeros(1))
+        if fault.channel.startswith("joint_"):
+            now = self._twins[self._faults.index(fault) + 1].zeros(doubted)
+        else:
+            zeros = [(stamp, twin.zeros(doubted)) for stamp, twin in self._repeated(fault)]
+            before, now = [each for stamp, each in zeros if stamp < onset or stamp == zeros[0][0]][-1], zeros[-1][1]
         change, spread = now[0] - before[0], np.sqrt(now[1] + before[1])
         axis = int(np.argmax(np.abs(change) / spread))
         self._zeros_before[fault.cause] = axis, float(before[0][axis])
