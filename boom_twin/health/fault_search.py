@@ -20,19 +20,7 @@ from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
-from .causes import (
-    CAME_BACK,
-    MEMORY,
-    TEMPER,
-    Evidence,
-    Fault,
-    Hypothesis,
-    Verdict,
-    evidence_of,
-    hypothesis,
-    possible_faults,
-    usual_size,
-)
+from .causes import CAME_BACK, MEMORY, TEMPER, Evidence, Fault, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
 from .creep import SPAN, CreepMonitor
 from .sensor_check import Flags
 
@@ -134,10 +122,7 @@ class FaultSearch:
         self._faults += [] if fault is None else [fault]
 
     def _believe(self, fault: Fault, place: int = 0) -> None:
-        """Let all twins go on with the zero of a sensor that drifts, or no more; begin anew if the boom itself is another.
-
-        `place` (from 1): of the twin that becomes the one of the boom as believed.
-        """
+        """Let all twins go on if a sensor is off, with twin `place` as believed, or right (0); else begin anew."""
         if fault.kind != "off":
             return self._begin()
         channels = hypothesis(self._scene, (fault,)).doubted
@@ -195,28 +180,28 @@ class FaultSearch:
         if (fault := self._back_again()) is not None:
             return self._ended(fault, stamp)
         verdict = self._decision.take(stamp, grown)
-        return [] if verdict is None else self._name(verdict, stamp)
+        return [] if verdict is None else self._name(*verdict, stamp)
 
-    def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
-        """Name the fault of a verdict, or end it if it is named; return its alarm.
+    def _name(self, place: int, begin: int, chances: Sequence[tuple[str, float]], stamp: int) -> list[Alarm]:
+        """Name the fault of a verdict (see `Verdict`), or end it if it is named; return its alarm.
 
         A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show.
         """
-        fault = self._faults[verdict.place]
+        fault = self._faults[place]
         if fault in self._named:
-            return self._ended(fault, verdict.onset)
+            return self._ended(fault, begin)
         if fault.cause.startswith("cylinder_") and fault.kind == "softer":
             creeps = int(fault.channel.removeprefix("cylinder_")) - 1 in self._creep.creeping
-            if creeps or stamp - verdict.onset < SPAN * SECOND:
+            if creeps or stamp - begin < SPAN * SECOND:
                 return []
-        if (found := self._sized(fault, verdict.onset)) is None:
-            self._decision.discard(verdict.place)
+        if (found := self._sized(fault, begin)) is None:
+            self._decision.discard(place)
             return []
         sized, spread, onset = found
-        ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
+        ranked = tuple(Ranked(cause, chance, ()) for cause, chance in chances)
         evidence = evidence_of(sized, spread) if fault.is_told else ""
         alarm = self._named[sized] = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
-        self._believe(fault, verdict.place + 1)
+        self._believe(fault, place + 1)
         return [alarm] if fault.is_told else []
 
     def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
