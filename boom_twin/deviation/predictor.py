@@ -25,13 +25,14 @@ from ..scene.kinematics import RigidJoints
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading, channels_of, streams_of
-from .channels import DRIFT_FIRST, LAG_FIRST, READS_MOMENT, TIP_IMU_STATES, measurement_of
+from .channels import DRIFT_FIRST, LAG_FIRST, READS_ACCELERATION, READS_MOMENT, TIP_IMU_STATES, measurement_of
 from .estimate_row import MODES
 from .kalman import FORCE_ZERO
 from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .rest_at_readings import RestFinder
 from .sensor_model import mounting_of
+from .sensors import INEXACT
 from .states import DOUBTS, ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
@@ -247,13 +248,24 @@ class BoomPredictor:
         f.apart[masked[:n] | strokes] = 0.0  # angle sensors are the first channels
 
     def doubt(self, channels: Collection[str]) -> None:
-        """Allow a large drift of the zeros of these sensors: angles, forces, axes of the IMU."""
+        """Allow a large drift of the zeros of these sensors alone: angles, forces, axes of the IMU."""
+        self.filters.drift[:] = 1.0
         self.filters.drift[self._zeros_of(channels)] = DOUBTED_DRIFT
 
     def zeros(self, channels: Collection[str]) -> tuple[Array, Array]:
-        """Return the estimated zeros of these sensors, in their units, and their variances, in the order of the states."""
-        places = zero_place(self.posture) + np.array(self._zeros_of(channels))
-        return self.filters.mean[ESTIMATE, places], self.filters.spread[ESTIMATE, places, places]
+        """Return the estimated zeros of these sensors, in their units, and their variances, in the order of the states.
+
+        The variances are at given mount and scale of the tip IMU, which do not change. Errors of the modelled acceleration
+        look like the zero of an IMU, and are in its variance.
+        """
+        f, first, places = self.filters, zero_place(self.posture), self._zeros_of(channels)
+        covariance, at, fixed = f.spread[ESTIMATE], first + np.array(places), first + np.array([2, 3])
+        shared = covariance[np.ix_(at, fixed)]
+        variances = covariance[at, at] - (shared @ np.linalg.pinv(covariance[np.ix_(fixed, fixed)]) * shared).sum(axis=1)
+        for row in self.posture.channels:
+            if row.kind == READS_ACCELERATION and row.zero in places:
+                variances[places.index(row.zero)] += INEXACT**2 * f.shaking[row.site, 0]
+        return f.mean[ESTIMATE, at], variances
 
     @property
     def clocks(self) -> dict[Stream, Clock]:

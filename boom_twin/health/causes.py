@@ -43,8 +43,7 @@ class Fault(NamedTuple):
 
     cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off`` or
     ``late``. size : relative loss, kg, kg/m, s; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis ``off``
-    lets the zero drift by any amount. is_told : False for a fault without an alarm; it competes so
-    that its effect is not blamed on others.
+    lets the zero drift by any amount. is_told : False without an alarm: it competes for its effect alone.
     """
 
     cause: str
@@ -53,14 +52,9 @@ class Fault(NamedTuple):
     is_told: bool = True
 
     @property
-    def is_load(self) -> bool:
-        """Return True for a fault of the load."""
-        return self.kind in ("more", "less")
-
-    @property
     def channel(self) -> str:
         """Channel of its alarm."""
-        return "tip" if self.is_load else self.cause.partition(".")[0]
+        return "tip" if self.kind in ("more", "less") else self.cause.partition(".")[0]
 
 
 class Hypothesis(NamedTuple):
@@ -90,7 +84,7 @@ def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
     extra, doubted, delays = {"tip.payload": 0.0, "line_fill": 0.0}, set[str](), list[tuple[Stream, float]]()
     for cause, kind, size, _ in faults:
         if kind == "softer":
-            parts = _springs(scene) if cause == "oil.k" else [cause]
+            parts = [name for name in parameter_names(scene) if name.endswith(".k")] if cause == "oil.k" else [cause]
             scene = with_parameters(scene, {name: (1.0 - size) * parameter(scene, name) for name in parts})
         elif kind == "off":
             name, channels = cause.removesuffix(".sensor"), channels_of(len(scene.joints))
@@ -102,15 +96,8 @@ def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
     return Hypothesis(scene, extra["tip.payload"], extra["line_fill"], frozenset(doubted), tuple(delays))
 
 
-def _springs(scene: Scene) -> list[str]:
-    return [name for name in parameter_names(scene) if name.endswith(".k")]
-
-
 def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
-    """Return all single faults that are compared for a boom, without zeros of angles that drive the model.
-
-    Two give no alarm. Warm oil softens all cylinders. The zero of the IMU looks like model errors in fast moves.
-    """
+    """Return all single faults that are compared for a boom; warm oil softens all cylinders and is no fault."""
     mass = explain(scene).mass
     found = [Fault(name, "softer", LOSS) for name in parameter_names(scene) if name.endswith((".k", ".EI", ".stiffness"))]
     found.append(Fault("oil.k", "softer", OIL_LOSS, False))
@@ -120,9 +107,7 @@ def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -
             found.append(Fault(cause, "less", size))
     names_of = channels_of(len(scene.joints))
     angles = () if reads is StrokeReading.ANGLE else names_of[Stream.ANGLES]
-    found += [
-        Fault(f"{name}.sensor", "off", is_told=name != "tip_imu") for name in (*angles, "tip_imu", *names_of[Stream.FORCES])
-    ]
+    found += [Fault(f"{name}.sensor", "off") for name in (*angles, "tip_imu", *names_of[Stream.FORCES])]
     streams = dict.fromkeys((reads.stream, Stream.ANGLES, Stream.IMU, Stream.FORCES))
     return [*found, *(Fault(f"{stream.value}.delay", "late", LATE) for stream in streams)]
 
@@ -209,11 +194,11 @@ def evidence_of(fault: Fault, spread: float) -> str:
     size = -fault.size if fault.kind in ("softer", "less") else fault.size
     if fault.kind == "softer":
         return f"{fault.cause.rpartition('.')[2]} {100.0 * size:.0f} % (+- {100.0 * spread:.0f})"
-    if fault.is_load:
+    if fault.channel == "tip":
         return change_text(size, "kg" if fault.cause == "tip.payload" else "kg/m", spread)
     if fault.kind == "late":
         return change_text(1e3 * size, "ms", 1e3 * spread)
-    return change_text(size, sensor_kind(fault.channel).unit, spread)
+    return change_text(size, sensor_kind(fault.channel.replace("tip_imu", "tip_imu_x")).unit, spread)
 
 
 def explains(named: Alarm, stream: Stream, deviation: Alarm) -> bool:

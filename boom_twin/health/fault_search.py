@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from statistics import NormalDist
 from typing import Any, NamedTuple, Protocol
@@ -20,19 +20,7 @@ from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
-from .causes import (
-    CAME_BACK,
-    MEMORY,
-    TEMPER,
-    Evidence,
-    Fault,
-    Hypothesis,
-    Verdict,
-    evidence_of,
-    hypothesis,
-    possible_faults,
-    usual_size,
-)
+from .causes import CAME_BACK, MEMORY, TEMPER, Evidence, Fault, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
 from .creep import SPAN, CreepMonitor
 from .sensor_check import Flags
 
@@ -62,6 +50,9 @@ class Follower(Protocol):
 
     def zeros(self, channels: Collection[str], /) -> tuple[Array, Array]:
         """Estimated zeros of sensors, and their variances."""
+
+    def doubt(self, channels: Collection[str], /) -> None:
+        """Let the zeros of these sensors drift by any amount."""
 
     def leave_out(self, masked: Flags, strokes: Flags, /) -> None:
         """Leave out measured channels, and strokes."""
@@ -114,17 +105,37 @@ class FaultSearch:
         more = [(fault, (*known, fault)) for fault in possible_faults(self._scene, self._reads) if fault.cause not in causes]
         self._faults, self._hypotheses, self._twins = list[Fault](), list[Hypothesis](), list[Follower]()
         for fault, faults in [(None, known), *fewer, *more]:
-            try:
-                each = hypothesis(self._scene, faults)
-                twin = self._made(each)
-                for second in list(self._recent)[-WARM_UP:]:
-                    _feed(twin, each, second)
-                self._twins.append(twin)
-            except BoomTwinError:  # an impossible boom, such as one with a part too soft to hold it
-                continue
-            self._hypotheses.append(each)
-            self._faults += [] if fault is None else [fault]
+            self._add(fault, faults)
         self._decide_anew()
+
+    def _add(self, fault: Fault | None, faults: Sequence[Fault]) -> None:
+        """Add the twin of a hypothesis, which is that of a boom with these faults."""
+        try:
+            each = hypothesis(self._scene, faults)
+            twin = self._made(each)
+            for second in list(self._recent)[-WARM_UP:]:
+                _feed(twin, each, second)
+        except BoomTwinError:  # an impossible boom, such as one with a part too soft to hold it
+            return
+        self._twins.append(twin)
+        self._hypotheses.append(each)
+        self._faults += [] if fault is None else [fault]
+
+    def _believe(self, fault: Fault, place: int = 0) -> None:
+        """Let all twins go on if a sensor is off, with twin `place` as believed, or right (0); else begin anew."""
+        if fault.kind != "off":
+            return self._begin()
+        channels = hypothesis(self._scene, (fault,)).doubted
+        if place:
+            self._twins[0], self._hypotheses[0] = self._twins.pop(place), self._hypotheses.pop(place)
+            del self._faults[place - 1]
+        doubted = [each.doubted | channels if place else each.doubted - channels for each in self._hypotheses]
+        for i, (twin, own) in enumerate(zip(self._twins, doubted, strict=True)):
+            twin.doubt(own)
+            self._hypotheses[i] = self._hypotheses[i]._replace(doubted=own)
+        if not place:
+            self._add(fault._replace(size=0.0), (*self._named, fault))
+        return self._decide_anew()
 
     def _decide_anew(self) -> None:
         """Discard all evidence of faults."""
@@ -169,34 +180,34 @@ class FaultSearch:
         if (fault := self._back_again()) is not None:
             return self._ended(fault, stamp)
         verdict = self._decision.take(stamp, grown)
-        return [] if verdict is None else self._name(verdict, stamp)
+        return [] if verdict is None else self._name(*verdict, stamp)
 
-    def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
-        """Name the fault of a verdict, or end it if it is named; return its alarm.
+    def _name(self, place: int, begin: int, chances: Sequence[tuple[str, float]], stamp: int) -> list[Alarm]:
+        """Name the fault of a verdict (see `Verdict`), or end it if it is named; return its alarm.
 
         A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show.
         """
-        fault = self._faults[verdict.place]
+        fault = self._faults[place]
         if fault in self._named:
-            return self._ended(fault, verdict.onset)
+            return self._ended(fault, begin)
         if fault.cause.startswith("cylinder_") and fault.kind == "softer":
             creeps = int(fault.channel.removeprefix("cylinder_")) - 1 in self._creep.creeping
-            if creeps or stamp - verdict.onset < SPAN * SECOND:
+            if creeps or stamp - begin < SPAN * SECOND:
                 return []
-        if (found := self._sized(fault, verdict.onset)) is None:
-            self._decision.discard(verdict.place)
+        if (found := self._sized(fault, begin)) is None:
+            self._decision.discard(place)
             return []
         sized, spread, onset = found
-        ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
+        ranked = tuple(Ranked(cause, chance, ()) for cause, chance in chances)
         evidence = evidence_of(sized, spread) if fault.is_told else ""
         alarm = self._named[sized] = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
-        self._begin()
+        self._believe(fault, place + 1)
         return [alarm] if fault.is_told else []
 
     def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
         """End a named fault at a stamp (ns); return its alarm."""
         alarm = replace(self._named.pop(fault), until=stamp)
-        self._begin()
+        self._believe(fault)
         return [alarm] if fault.is_told else []
 
     def _back_again(self) -> Fault | None:
@@ -260,12 +271,16 @@ class FaultSearch:
         return np.array(found)
 
     def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float]:
-        """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), and the standard deviation."""
-        doubted = hypothesis(self._scene, (fault,)).doubted
-        before: Any = None
-        for stamp, twin in self._repeated(fault):
-            now = twin.zeros(doubted)
-            before = now if before is None or stamp < onset else before
+        """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), and the standard deviation.
+
+        An angle sensor has no zero before, so its change may be older than the evidence.
+        """
+        doubted, before = hypothesis(self._scene, (fault,)).doubted, (np.zeros(1), np.zeros(1))
+        if fault.channel.startswith("joint_"):
+            now = self._twins[self._faults.index(fault) + 1].zeros(doubted)
+        else:
+            zeros = [(stamp, twin.zeros(doubted)) for stamp, twin in self._repeated(fault)]
+            before, now = [each for stamp, each in zeros if stamp < onset or stamp == zeros[0][0]][-1], zeros[-1][1]
         change, spread = now[0] - before[0], np.sqrt(now[1] + before[1])
         axis = int(np.argmax(np.abs(change) / spread))
         self._zeros_before[fault.cause] = axis, float(before[0][axis])

@@ -104,6 +104,11 @@ class SampleTaker:
         assert self.judge is not None
         return self.judge.suspected, self.judge.failing_strokes
 
+    def doubt(self, channels: Collection[str]) -> None:
+        """Let the zeros of these sensors drift by any amount, and those of all others as they do."""
+        self._doubted = frozenset(channels)
+        self._boom.doubt(self._doubted)
+
     def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
         self._boom.leave_out(masked, strokes)
 

@@ -190,3 +190,19 @@ def test_a_mode_that_swings_is_told_with_the_tips_velocity_and_lengths_have_inno
     assert np.sqrt(np.mean(np.square(ratios[-300:-1]), axis=0)) == pytest.approx(np.ones(N), abs=0.25)
     assert report.residuals[0].names[1] == "cylinder_2" and report.residuals[0].values[1] == pytest.approx(1e-3, abs=1e-4)
     assert abs(ratios[-1][1]) > 20.0 and np.abs(ratios[-1][[0, 2, 3]]).max() < 5.0
+
+
+def test_the_zero_of_the_imu_is_known_beside_its_mount_and_as_well_as_the_acceleration() -> None:
+    """At rest a zero and the mount read alike; neither the mount nor the scale changes. Accelerations are 3 % uncertain."""
+    boom = BoomPredictor(SCENE, Settings())
+    boom.start(REST.lengths)
+    covariance, first = boom.filters.spread[ESTIMATE], zero_place(boom.posture)
+    covariance[first : first + 4, first : first + 4] = [
+        [0.3, 0.0, 0.2, 0.0],
+        [0.0, 0.5, 0.0, 0.1],
+        [0.2, 0.0, 0.4, 0.0],
+        [0.0, 0.1, 0.0, 0.2],
+    ]
+    boom.filters.shaking[0, 0] = 4.0
+    _, variances = boom.zeros(["tip_imu_x", "tip_imu_z"])
+    assert variances == pytest.approx([0.3 - 0.2**2 / 0.4 + 0.06**2, 0.5 - 0.1**2 / 0.2 + 0.06**2])

@@ -123,6 +123,9 @@ class Follower:
         """Take a second of samples."""
         self.evidence += self._rate(int(block.stamps[0]) // SECOND)
 
+    def doubt(self, channels):
+        """Doubt what is doubted anyway."""
+
     def leave_out(self, masked, strokes):
         """Leave out nothing."""
         assert not masked.any() and not strokes.any()
@@ -198,6 +201,57 @@ def test_a_sensor_is_named_off_above_what_a_healthy_boom_shows(channel, sigma, c
 
     named = [alarm.cause for alarm in taken(FaultTwins(load_scene(), made, SETTINGS), 40)]
     assert named == [f"{channel}.sensor"] * is_named
+
+
+class Zeroed(Follower):
+    """A twin in which the zeros of all sensors change in a second and come back in another one."""
+
+    def __init__(self, rate, size, sigma, begin, end, doubted):
+        super().__init__(rate)
+        self._size, self._sigma, self._begin, self._end, self.doubted, self.second = size, sigma, begin, end, doubted, 0
+
+    def take(self, block):
+        super().take(block)
+        self.second = int(block.stamps[0]) // SECOND
+
+    def doubt(self, channels):
+        """Keep which sensors are doubted."""
+        self.doubted = channels
+
+    def zeros(self, channels):
+        """Return the zeros, and their variances."""
+        size = self._size * (self._begin <= self.second < self._end)
+        return np.full(len(channels), size), np.full(len(channels), self._sigma**2)
+
+
+def test_a_zero_that_changed_before_its_evidence_is_named():
+    """An angle sensor reads wrong since second 10, and all twins have restarted since then."""
+
+    def made(each):
+        gains = 30.0 * ("joint_2" in each.doubted)
+        return Zeroed(lambda second: gains * (second >= 20), 1e-3, 1e-5, 10, 99, each.doubted)
+
+    (alarm,) = taken(FaultTwins(load_scene(), made, SETTINGS), 40)
+    assert alarm.cause == "joint_2.sensor" and "+0.0573 deg" in alarm.evidence
+
+
+def test_a_named_sensor_leaves_all_twins_running():
+    """The boom does not change by it: the twins go on, all doubt the sensor, and no more once it reads right again."""
+    made = []
+
+    def make(each):
+        gains = 30.0 * ("tip_imu_x" in each.doubted)
+        made.append(Zeroed(lambda second: gains * (20 <= second < 40), 0.4, 0.05, 20, 40, each.doubted))
+        return made[-1]
+
+    twins = FaultTwins(load_scene(), make, SETTINGS)
+    begun = taken(twins, 30)
+    running = [twin for twin in made if twin.second > 20]
+    assert [alarm.cause for alarm in begun] == ["tip_imu.sensor"] and begun[0].since == 20 * SECOND
+    assert len(running) == len(possible_faults(load_scene())) + 1 + 1  # one more to know the zero before
+    (ended,) = taken(twins, 30, 30)
+    assert ended.until == 40 * SECOND
+    assert sum("tip_imu_x" in twin.doubted for twin in made if twin.second > 50) == 1
 
 
 def test_a_boom_as_believed_that_had_to_restart_is_no_evidence():
