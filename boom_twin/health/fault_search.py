@@ -39,7 +39,7 @@ from .sensor_check import Flags
 RATIO = 1.4  # of successive trial sizes of a named fault
 IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
-WARM_UP = 10  # s of recent samples that new twins take first: they start at rest, and the boom may be moving
+WARM_UP = 10  # s of recent samples that new twins take first: they know neither motion nor zeros when they start
 
 
 class Follower(Protocol):
