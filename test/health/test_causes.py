@@ -225,6 +225,42 @@ def test_a_boom_as_believed_that_had_to_restart_is_no_evidence():
     assert taken(FaultTwins(load_scene(), lambda each: Knowing(lambda _: 100.0 * spring_of(each)), SETTINGS), 60) == []
 
 
+def test_a_twin_that_diverges_keeps_no_name_away():
+    """From second 10 on the likelihood of a late stream is not a number; a softer spring is named in spite of it."""
+
+    def made(each):
+        return Follower(lambda second: math.nan if each.delays and second >= 10 else -100.0 * (spring_of(each) - 0.3) ** 2)
+
+    assert [alarm.cause for alarm in taken(FaultTwins(load_scene(), made, SETTINGS), 40)] == ["cylinder_2.k"]
+
+
+def test_a_sensor_that_fails_is_left_out_of_the_seconds_before():
+    """Its last readings misled the twins. So others take the last ten seconds without it, once in a minute."""
+    flags, made = (np.arange(10) == 3, np.zeros(4, bool)), []
+
+    class Leaving(Follower):
+        left_out = ()
+
+        def leave_out(self, masked, strokes):
+            self.left_out += (bool(masked[3]),)
+
+    def make(each):
+        made.append(Leaving(lambda second: 0.0))
+        return made[-1]
+
+    twins = FaultTwins(load_scene(), make, SETTINGS)
+    taken(twins, 20)
+    twins.news(30 * SECOND)
+    count = len(made)
+    for first in (20, 30):
+        taken(twins, 5, first, flags)
+        taken(twins, 5, first + 5)
+    twins.news(60 * SECOND)
+    assert len(made) == 2 * count
+    assert made[0].left_out == (False,) * len(made[0].left_out)
+    assert made[-1].left_out[:15] == (True,) * 15
+
+
 def test_a_fault_comes_and_goes():
     """A fault is named with its size from its onset on; the twins that lack it end the alarm where they gain."""
 
