@@ -2,11 +2,13 @@
 
 Every second gives each hypothesis a gain: its log likelihood less that of the boom as believed. The evidence of a hypothesis is
 the largest sum of its gains up to now, over all possible onsets.
-A cause is named if its posterior probability is high. Three facts limit that.
+A cause is named if its posterior probability is high. Four facts limit that.
 
 - Successive innovations are not independent. So likelihoods are raised to the power `TEMPER`.
 - An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. In each
   second no log likelihood counts as more than `MOST_GAIN` below the best.
+- Such effects favour now one cause, now another. So the mean gain since the onset must be surely above zero by its own
+  scatter, for all onsets and causes together (Q. Vuong, Econometrica 57 (1989), 307-333, with the bound of Bonferroni).
 - Parameters of a healthy boom are wrong by `Settings.scene_error`. So its likelihood is that of the boom as believed, and
   what these errors are expected to cost that. A fault is named only if its size is likelier than one that these errors make
   appear.
@@ -17,6 +19,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
@@ -169,7 +172,8 @@ class Evidence:
         bounded = np.maximum(likelihoods, likelihoods.max() - MOST_GAIN)
         self._gains.append(self._gains[-1] + bounded[1:] - bounded[0])
         self._stamps.append(stamp)
-        rises = self._gains[-1] - np.array(self._gains)
+        gains = np.array(self._gains)
+        rises = gains[-1] - gains
         evidence, onsets = rises.max(axis=0), len(rises) - 1 - rises[::-1].argmax(axis=0)
         causes = {"": 0.0}  # the healthy boom and each cause are equally probable before
         for fault, rise in zip(self._faults, evidence.tolist(), strict=True):
@@ -177,7 +181,9 @@ class Evidence:
         weights = np.exp(TEMPER * (np.array(list(causes.values())) - max(causes.values())))
         chances = dict(zip(causes, (weights / weights.sum()).tolist(), strict=True))
         best = int(np.argmax(evidence))
-        if chances[self._faults[best].cause] < self._odds:
+        grown = np.diff(gains[onsets[best] :, best])
+        sure = NormalDist().inv_cdf(1.0 - (1.0 - self._odds) / rises.size)
+        if chances[self._faults[best].cause] < self._odds or grown.sum() < sure * grown.std() * math.sqrt(len(grown)):
             return None
         shown = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])[:3]
         shown.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in shown))))

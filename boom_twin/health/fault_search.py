@@ -27,7 +27,7 @@ from .sensor_check import Flags
 RATIO = 1.4  # of successive trial sizes of a named fault
 IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
-WARM_UP = 10  # s of recent samples that new twins take first: they start at rest, and the boom may be moving
+WARM_UP = 10  # s of recent samples that new twins take first: they know neither motion nor zeros when they start
 
 
 class Follower(Protocol):
@@ -157,6 +157,9 @@ class FaultSearch:
                 twin.requests.repeat(_changed(second.change, each))
             self._decide_anew()
             return []
+        if second.left_out is not None and self._is_newly_left_out(second.left_out):  # its last readings misled all states
+            self._recent = deque((each._replace(left_out=second.left_out) for each in self._recent), MEMORY)
+            self._begin()
         self._recent.append(second)
         leaks = [] if self._reads is StrokeReading.ANGLE else self._creep.take(second.stamp, second.block)
         if leaks:
@@ -164,16 +167,22 @@ class FaultSearch:
         doubts = self._twins[0].doubts
         for each, twin in zip(self._hypotheses, self._twins, strict=True):
             _feed(twin, each, second)
-        if self._twins[0].doubts > doubts:
+        if self._twins[0].doubts > doubts or math.isnan(self._twins[0].evidence):
             self._recent.clear()  # it has half forgotten zeros and load; any other would gain by what it still knows
             self._begin()
             return leaks
         return [*leaks, *self._decided(second.stamp)]
 
+    def _is_newly_left_out(self, flags: tuple[Flags, Flags]) -> bool:
+        """Return True if a sensor fails that no recent second leaves out."""
+        before = [each.left_out for each in self._recent if each.left_out is not None]
+        return bool(before) and any((now & ~np.any(then, axis=0)).any() for now, *then in zip(flags, *before, strict=True))
+
     def _decided(self, stamp: int) -> list[Alarm]:
         """Return the alarms of named faults that begin or end with the evidence of a second."""
         before, self._evidence = self._evidence, np.array([twin.evidence for twin in self._twins])
         grown = self._evidence - before
+        grown[np.isnan(grown)] = np.nanmin(grown)  # a twin that diverged is as unlikely as the least likely one
         self._age += 1
         if self._age <= SETTLING:
             return []
@@ -268,7 +277,7 @@ class FaultSearch:
                 total = twin.evidence
         except BoomTwinError:
             return np.full(sum(second.stamp >= onset for second in self._recent), IMPOSSIBLE)
-        return np.array(found)
+        return np.nan_to_num(found, nan=IMPOSSIBLE)
 
     def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float]:
         """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), and the standard deviation.

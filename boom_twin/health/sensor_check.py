@@ -60,19 +60,10 @@ REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to r
 
 
 def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, tuple[Array, Array]]:
-    """Return the lowest and highest values that the sensors of every stream can measure.
+    """Return the lowest and highest values (SI, shape (channels,) each) that the sensors of every stream can measure.
 
-    Parameters
-    ----------
-    scene : Scene
-        Strokes are from 0 to ``max_stroke``, angles as in ``range_deg`` and `GIVE` beyond; others have no bounds.
-    mounts : sequence of Mount or None
-        Of the sensor of each joint; an inclinometer (not None) has no bounds either.
-
-    Returns
-    -------
-    dict of Stream to (ndarray, ndarray)
-        SI, shape (channels,) each; infinite where there is no bound.
+    Strokes are from 0 to ``max_stroke``, angles as in ``range_deg`` and `GIVE` beyond. Others are unbounded, and so are
+    inclinometers, the joints with a mount.
     """
     joints = scene.joints
     found = {stream: (np.full(len(c), -np.inf), np.full(len(c), np.inf)) for stream, c in channels_of(len(joints)).items()}
@@ -100,15 +91,9 @@ class SensorFindings(NamedTuple):
 class StreamReadings(NamedTuple):
     """A block of k readings.
 
-    Attributes
-    ----------
-    rows : MeasuredRows
-    means : ndarray, shape (2, channels)
-        Means of readings that the model has something to compare with, and of the expected ones; NaN of none.
-    slow : SlowMeans
-    is_bent : bool
-        True if trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by second and
-        by third differences, motion much less by third ones.
+    means : (2, channels) of readings that the model has something to compare with, and of the expected ones; NaN of none.
+    is_bent : True if trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by
+    second and by third differences, motion much less by third ones.
     """
 
     rows: MeasuredRows
@@ -128,10 +113,6 @@ class SensorCheck:
         Their range.
     fastest : float
         What the quantity may change by, per s: more is a jump of the sensor. 0 where a jump is judged by the noise alone.
-
-    Attributes
-    ----------
-    slow : SlowMeans
     """
 
     def __init__(self, sigma: float, resolution: float, low: Array, high: Array, fastest: float) -> None:

@@ -118,12 +118,16 @@ def has_spikes(times, left, i, least):
 
 @inner
 def jump(times, raw, left, i, least, fastest):
-    """Return how far readings of channel i changed at once by more than `least` and more than `fastest` allows, for good."""
+    """Return how far readings of channel i changed at once by more than `least` and more than `fastest` allows, for good.
+
+    The readings make most of that step themselves: where they lag all at once, the expected ones do.
+    """
     total = 0.0
     for t in range(2, times.shape[0] - 1):
         change = step(times, left, t, i)
         most = max(least, fastest * (times[t] - times[t - 1]))
-        if not (abs(change) > most and abs(raw[t, i] - raw[t - 1, i]) > most):
+        read = math.copysign(1.0, change) * (raw[t, i] - raw[t - 1, i])
+        if not (abs(change) > most and read > max(most, 0.5 * abs(change))):
             continue
         lasting = 0.5 * (left[t, i] + left[t + 1, i]) - 0.5 * (left[t - 2, i] + left[t - 1, i])
         before, after = abs(left[t - 1, i] - left[t - 2, i]), abs(left[t + 1, i] - left[t, i])

@@ -278,7 +278,7 @@ class SampleTaker:
 
     def _start(self, sample: Sample, events: list[str]) -> ReportBlock:
         try:
-            sample = replace(sample, values=self._boom.start(sample.values, not self._is_new))
+            sample = replace(sample, values=self._boom.start(sample.values, self._is_follower or not self._is_new))
         except BoomTwinError as error:
             self._failed = sample.stamp if isinstance(error, SolverError) else self._failed
             return self._refuse(sample, "model", *events, status=str(error))

@@ -49,6 +49,13 @@ def test_one_second_is_never_enough():
     assert verdict([SPRING, SECTION], burst) == (None, None)
 
 
+def test_gains_that_scatter_name_nothing():
+    """A cause that some seconds favour and others speak against is not named by what is left over; a steady one is."""
+    assert 3.0 * ENOUGH < 30 * (12.0 - 8.0)
+    assert verdict([SPRING, SECTION], [[12.0, 0.0], [-8.0, 0.0]] * 30) == (None, None)
+    assert verdict([SPRING, SECTION], [[2.0, 0.0]] * 60)[0].place == 0
+
+
 @pytest.mark.parametrize(("other", "second"), [(-100.0, 20 + math.ceil(ENOUGH / 3.0) - 1), (-1000.0, None)])
 def test_errors_of_all_parameters_may_look_like_a_fault(other, second):
     """A cause that gains less than errors of 2 % are expected to cost, by what a fault of 25 % costs, is not named."""
@@ -139,6 +146,9 @@ class Follower:
         self.changes.append(change)
 
 
+NOTHING = np.zeros(10, bool), np.zeros(4, bool)  # left out of the samples: measured channels, strokes
+
+
 @cache
 def stiffness():
     """Return that of spring 2 of the default boom."""
@@ -150,12 +160,12 @@ def spring_of(each):
     return 1.0 - each.scene.joints[1].cylinder.k / stiffness()
 
 
-def taken(twins, seconds, first=0):
+def taken(twins, seconds, first=0, left_out=NOTHING):
     """Return the alarms that twins begin and end with so many seconds of samples from the `first` on."""
     found = []
     for second in range(first, first + seconds):
         stamps = np.array([second * SECOND, second * SECOND + SECOND // 2])
-        twins.reach(second * SECOND, lambda: (np.zeros(10, bool), np.zeros(4, bool)))
+        twins.reach(second * SECOND, lambda: left_out)
         twins.take(SampleBlock(np.zeros(2, np.int64), stamps, np.zeros((2, 4))))
         found += twins.news(second * SECOND)
     return found
@@ -267,6 +277,42 @@ def test_a_boom_as_believed_that_had_to_restart_is_no_evidence():
             self.doubts += self._rate(second) == 0.0 and second == 20
 
     assert taken(FaultTwins(load_scene(), lambda each: Knowing(lambda _: 100.0 * spring_of(each)), SETTINGS), 60) == []
+
+
+def test_a_twin_that_diverges_keeps_no_name_away():
+    """From second 10 on the likelihood of a late stream is not a number; a softer spring is named in spite of it."""
+
+    def made(each):
+        return Follower(lambda second: math.nan if each.delays and second >= 10 else -100.0 * (spring_of(each) - 0.3) ** 2)
+
+    assert [alarm.cause for alarm in taken(FaultTwins(load_scene(), made, SETTINGS), 40)] == ["cylinder_2.k"]
+
+
+def test_a_sensor_that_fails_is_left_out_of_the_seconds_before():
+    """Its last readings misled the twins. So others take the last ten seconds without it, once in a minute."""
+    flags, made = (np.arange(10) == 3, np.zeros(4, bool)), []
+
+    class Leaving(Follower):
+        left_out = ()
+
+        def leave_out(self, masked, strokes):
+            self.left_out += (bool(masked[3]),)
+
+    def make(each):
+        made.append(Leaving(lambda second: 0.0))
+        return made[-1]
+
+    twins = FaultTwins(load_scene(), make, SETTINGS)
+    taken(twins, 20)
+    twins.news(30 * SECOND)
+    count = len(made)
+    for first in (20, 30):
+        taken(twins, 5, first, flags)
+        taken(twins, 5, first + 5)
+    twins.news(60 * SECOND)
+    assert len(made) == 2 * count
+    assert made[0].left_out == (False,) * len(made[0].left_out)
+    assert made[-1].left_out[:15] == (True,) * 15
 
 
 def test_a_fault_comes_and_goes():

@@ -11,6 +11,7 @@ from health.recorded import session
 
 from boom_twin import Twin, load_scene
 from boom_twin.twin.blocks import block_of
+from boom_twin.types import SECOND
 
 BAGS = Path(__file__).parents[2] / "bags"
 SOFTER = 0.3  # share
@@ -100,5 +101,23 @@ def test_a_fault_twin_has_the_evidence_of_a_twin_without_its_reports():
     """Reports of a fault twin are empty, and its likelihood is that of a twin with reports, bit for bit."""
     scene, samples = load_scene(), session(2.0)
     block, usual, follower = block_of(samples, len(scene.joints)), Twin(scene), Twin(scene, is_follower=True)
+    usual._is_new = False  # as after a pause: the boom may move
     assert len(usual.take(block).predictions.stamps) > 100 and len(follower.take(block).predictions.stamps) == 0
     assert follower.evidence == usual.evidence != 0.0
+
+
+def test_a_fault_twin_may_start_amid_a_move():
+    """Readings 1 s after its start are as likely as to a twin that has followed the whole session, within 100 nats.
+
+    A twin that takes the boom for resting loses a thousand.
+    """
+    scene, samples, likely = load_scene(), session(7.0), list[float]()
+    stamps = np.array([each.stamp for each in samples])
+    first, second, third = np.searchsorted(stamps, stamps[0] + np.array([5, 6, 7]) * SECOND)
+    for begin in (0, first):
+        twin = Twin(scene, is_follower=True)
+        twin.take(block_of(samples[begin:second], len(scene.joints)))
+        before = twin.evidence
+        twin.take(block_of(samples[second:third], len(scene.joints)))
+        likely.append(twin.evidence - before)
+    assert abs(likely[1] - likely[0]) < 100.0
