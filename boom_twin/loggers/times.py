@@ -164,7 +164,7 @@ def _numbers(table: LogTable, rows: LogRows, cells: Times, header: str, unit: st
         numbers, told = numbers - SINCE_1904, f"{told} since 1904"
     if np.any(numbers >= LATEST):
         raise BagError(
-            f"{table.source}: {header} goes to {numbers.max() / SECOND:.10g} s: not in {unit}. Give its unit in --columns FILE."
+            f"{table.source}: {header} goes beyond {LATEST / SECOND:.4g} s: not in {unit}. Give its unit in --columns FILE."
         )
     return TableTimes(numbers, f"{header}: {told}", first > 365 * 86_400 * SECOND)
 
@@ -180,8 +180,9 @@ def _values(table: LogTable, rows: LogRows, cells: Times, header: str) -> Array:
 
 
 def _integers(table: LogTable, rows: LogRows, cells: Times, header: str, size: int) -> Stamps:
-    """Return times in a unit of `size` ns as integers, ns."""
+    """Return times in a unit of `size` ns as integers, ns, those beyond `LATEST` as one of these."""
     if isinstance(cells, np.ndarray):
+        cells = np.minimum(cells, -(-LATEST // size))
         if cells.dtype.kind in "iu":
             return cells.astype(np.int64) * size
         if not np.isfinite(cells).all():
@@ -193,7 +194,7 @@ def _integers(table: LogTable, rows: LogRows, cells: Times, header: str, size: i
     stamps = np.empty(len(cells), np.int64)
     for row, text in enumerate(cells):
         try:
-            stamps[row] = int((Decimal(text.replace(",", ".")) * size).to_integral_value())
+            stamps[row] = min(int((Decimal(text.replace(",", ".")) * size).to_integral_value()), LATEST)
         except (ArithmeticError, ValueError):
             raise BagError(
                 f"{table.source}, {rows.place(row)}: {header} = {text!r} is not a time. Correct it, or leave the line out."
