@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Collection, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import repeat
 from statistics import NormalDist
 from typing import Any, NamedTuple, Protocol
 
@@ -19,6 +21,7 @@ import numpy as np
 from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
+from ..system.processes import usable_cores
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
 from .causes import (
     CAME_BACK,
@@ -99,6 +102,7 @@ class FaultSearch:
         reads: StrokeReading = StrokeReading.LENGTH,
     ) -> None:
         self._scene, self._make, self._settings, self._reads = scene, make, settings, reads
+        self._cores = ThreadPoolExecutor(usable_cores(), "fault twins")  # twins do not depend on each other
         self._recent: deque[Second] = deque(maxlen=MEMORY)
         self._change: Change | None = None
         self._creep = CreepMonitor(scene)
@@ -112,19 +116,22 @@ class FaultSearch:
         causes = {fault.cause for fault in known}
         fewer = [(fault, tuple(each for each in known if each is not fault)) for fault in known if fault.kind != "off"]
         more = [(fault, (*known, fault)) for fault in possible_faults(self._scene, self._reads) if fault.cause not in causes]
-        self._faults, self._hypotheses, self._twins = list[Fault](), list[Hypothesis](), list[Follower]()
-        for fault, faults in [(None, known), *fewer, *more]:
-            try:
-                each = hypothesis(self._scene, faults)
-                twin = self._made(each)
-                for second in list(self._recent)[-WARM_UP:]:
-                    _feed(twin, each, second)
-                self._twins.append(twin)
-            except BoomTwinError:  # an impossible boom, such as one with a part too soft to hold it
-                continue
-            self._hypotheses.append(each)
-            self._faults += [] if fault is None else [fault]
+        faults, booms = zip((None, known), *fewer, *more, strict=True)
+        found = [(fault, *each) for fault, each in zip(faults, self._cores.map(self._warm, booms), strict=True) if each]
+        self._faults = [fault for fault, _, _ in found if fault is not None]
+        self._hypotheses, self._twins = [each for _, each, _ in found], [twin for _, _, twin in found]
         self._decide_anew()
+
+    def _warm(self, faults: tuple[Fault, ...]) -> tuple[Hypothesis, Follower] | None:
+        """Return the hypothesis of these faults, and its twin after the newest seconds; None for an impossible boom."""
+        try:
+            each = hypothesis(self._scene, faults)
+            twin = self._made(each)
+            for second in list(self._recent)[-WARM_UP:]:
+                _feed(twin, each, second)
+        except BoomTwinError:  # such as one with a part too soft to hold it
+            return None
+        return each, twin
 
     def _decide_anew(self) -> None:
         """Discard all evidence of faults."""
@@ -136,6 +143,10 @@ class FaultSearch:
         if self._change is not None:
             twin.requests.repeat(_changed(self._change, each))
         return twin
+
+    def close(self) -> None:
+        """End the threads; a call that they work for fails."""
+        self._cores.shutdown(cancel_futures=True)
 
     def __call__(self, second: Second) -> list[Alarm]:
         """Let all twins take a second or a change; return the alarms that begin or end."""
@@ -151,8 +162,7 @@ class FaultSearch:
         if leaks:
             self._decide_anew()
         doubts = self._twins[0].doubts
-        for each, twin in zip(self._hypotheses, self._twins, strict=True):
-            _feed(twin, each, second)
+        deque(self._cores.map(_feed, self._twins, self._hypotheses, repeat(second)), 0)
         if self._twins[0].doubts > doubts:
             self._recent.clear()  # it has half forgotten zeros and load; any other would gain by what it still knows
             self._begin()
