@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from ..compiler.compile import compile_scene
 from ..compiler.plan import first_row, taken_apart
 from ..errors import SolverError
-from ..scene.kinematics import posture_angles, skeleton, strokes_of_angles
+from ..scene.kinematics import posture_angles, rigid_chain, strokes_of_angles
 from ..scene.schema import Scene
 from ..types import Array
 from .bending_stress import moments_by_unknowns, stations
@@ -90,6 +90,7 @@ class _Boom:
         self._scene, self._plan = scene, compile_scene(scene)
         self._bending = moments_by_unknowns(self._plan)
         self._owners = np.array([station.section for station in stations(scene)], dtype=int)
+        self._chain = np.array(scene.base.pivot), np.array([section.length for section in scene.sections])
         self._bounds = np.radians([joint.range_deg for joint in scene.joints])
         self.skipped = dict.fromkeys(("out of a cylinder's travel", "no equilibrium"), 0)
 
@@ -104,15 +105,15 @@ class _Boom:
         state, work = plan.state(), plan.work()
         try:
             settle(plan, state, work, strokes, relative)
-            frequencies = [mode.frequency for mode in natural_modes(plan, state, work, modes, frequency_accuracy)]
+            found = natural_modes(plan, state, work, modes, frequency_accuracy) if modes else ()
         except SolverError:
             self.skipped["no equilibrium"] += 1
             return None
-        tip, straight = state.frames[-1, :2], skeleton(scene, relative)
+        tip, (headings, pivots) = state.frames[-1, :2], rigid_chain(*self._chain, relative)
         forces = taken_apart(plan, first_row(plan, state)).cylinder_forces
         moments = _largest(self._bending @ state.z, self._owners, plan.joints)
-        deflection = np.hypot(*(tip - straight.pivots[-1]))
-        return np.concatenate([np.degrees(straight.headings), tip, [deflection], forces, moments, frequencies])
+        deflection, frequencies = np.hypot(*(tip - pivots[-1])), [mode.frequency for mode in found]
+        return np.concatenate([np.degrees(headings), tip, [deflection], forces, moments, frequencies])
 
     def extreme(self, grid: Array, k: int, sign: float) -> Array | None:
         """Return the row of largest ``sign * row[k]`` that is found from the best of `grid`; None if none is better."""

@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import repeat
 from statistics import NormalDist
 from typing import Any, NamedTuple, Protocol
 
@@ -19,6 +21,7 @@ import numpy as np
 from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
+from ..system.processes import usable_cores
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
 from .causes import CAME_BACK, MEMORY, TEMPER, Evidence, Fault, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
 from .creep import SPAN, CreepMonitor
@@ -90,6 +93,7 @@ class FaultSearch:
         reads: StrokeReading = StrokeReading.LENGTH,
     ) -> None:
         self._scene, self._make, self._settings, self._reads = scene, make, settings, reads
+        self._cores = ThreadPoolExecutor(usable_cores(), "fault twins")  # twins do not depend on each other
         self._recent: deque[Second] = deque(maxlen=MEMORY)
         self._change: Change | None = None
         self._creep = CreepMonitor(scene)
@@ -103,23 +107,22 @@ class FaultSearch:
         causes = {fault.cause for fault in known}
         fewer = [(fault, tuple(each for each in known if each is not fault)) for fault in known if fault.kind != "off"]
         more = [(fault, (*known, fault)) for fault in possible_faults(self._scene, self._reads) if fault.cause not in causes]
-        self._faults, self._hypotheses, self._twins = list[Fault](), list[Hypothesis](), list[Follower]()
-        for fault, faults in [(None, known), *fewer, *more]:
-            self._add(fault, faults)
+        faults, booms = zip((None, known), *fewer, *more, strict=True)
+        found = [(fault, *each) for fault, each in zip(faults, self._cores.map(self._warm, booms), strict=True) if each]
+        self._faults = [fault for fault, _, _ in found if fault is not None]
+        self._hypotheses, self._twins = [each for _, each, _ in found], [twin for _, _, twin in found]
         self._decide_anew()
 
-    def _add(self, fault: Fault | None, faults: Sequence[Fault]) -> None:
-        """Add the twin of a hypothesis, which is that of a boom with these faults."""
+    def _warm(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower] | None:
+        """Return the hypothesis of these faults, and its twin after the newest seconds; None for an impossible boom."""
         try:
             each = hypothesis(self._scene, faults)
             twin = self._made(each)
             for second in list(self._recent)[-WARM_UP:]:
                 _feed(twin, each, second)
-        except BoomTwinError:  # an impossible boom, such as one with a part too soft to hold it
-            return
-        self._twins.append(twin)
-        self._hypotheses.append(each)
-        self._faults += [] if fault is None else [fault]
+        except BoomTwinError:  # such as one with a part too soft to hold it
+            return None
+        return each, twin
 
     def _believe(self, fault: Fault, place: int = 0) -> None:
         """Let all twins go on if a sensor is off, with twin `place` as believed, or right (0); else begin anew."""
@@ -133,8 +136,10 @@ class FaultSearch:
         for i, (twin, own) in enumerate(zip(self._twins, doubted, strict=True)):
             twin.doubt(own)
             self._hypotheses[i] = self._hypotheses[i]._replace(doubted=own)
-        if not place:
-            self._add(fault._replace(size=0.0), (*self._named, fault))
+        if not place and (found := self._warm((*self._named, fault))) is not None:
+            self._hypotheses.append(found[0])
+            self._twins.append(found[1])
+            self._faults.append(fault._replace(size=0.0))
         return self._decide_anew()
 
     def _decide_anew(self) -> None:
@@ -147,6 +152,10 @@ class FaultSearch:
         if self._change is not None:
             twin.requests.repeat(_changed(self._change, each))
         return twin
+
+    def close(self) -> None:
+        """End the threads; a call that they work for fails."""
+        self._cores.shutdown(cancel_futures=True)
 
     def __call__(self, second: Second) -> list[Alarm]:
         """Let all twins take a second or a change; return the alarms that begin or end."""
@@ -165,8 +174,7 @@ class FaultSearch:
         if leaks:
             self._decide_anew()
         doubts = self._twins[0].doubts
-        for each, twin in zip(self._hypotheses, self._twins, strict=True):
-            _feed(twin, each, second)
+        deque(self._cores.map(_feed, self._twins, self._hypotheses, repeat(second)), 0)
         if self._twins[0].doubts > doubts or math.isnan(self._twins[0].evidence):
             self._recent.clear()  # it has half forgotten zeros and load; any other would gain by what it still knows
             self._begin()

@@ -55,17 +55,17 @@ class FaultTwins:
         self._worker.submit(lambda: self._search)
 
     def close(self) -> None:
-        """End the process of a live node, also while it works."""
-        self._end_process()
+        """End the threads, and the process of a live node, also while they work."""
+        self._end_search()
         self._worker.shutdown(cancel_futures=True)
-        self._end_process()  # one that was started meanwhile
+        self._end_search()  # one that was started meanwhile
 
-    def _end_process(self) -> None:
-        if isinstance(search := vars(self).get("_search"), ChildCall):
+    def _end_search(self) -> None:
+        if (search := vars(self).get("_search")) is not None:
             search.close()
 
     @cached_property
-    def _search(self) -> Callable[[Second], list[Alarm]]:
+    def _search(self) -> ChildCall | FaultSearch:
         return ChildCall(FaultSearch, *self._given) if self._is_live else FaultSearch(*self._given)
 
     # -- samples in

@@ -142,7 +142,6 @@ def number_rows(chain: Chain, p: Prediction | PredictionBlock | None, e: Estimat
         rows = e.rows if isinstance(e, EstimateBlock) else row_of(e)[np.newaxis]
         numbers[:, at + 3 : -2] = rows[:, :FORCE_VARIANCE]
     _DERIVE(chain.pivot, chain.lengths, numbers, JOINTS, at)
-    derived = numbers[:, [at, at + 1, at + 2, -2, -1]]
+    derived = numbers[:, at : at + 3]
     derived[np.isnan(derived)] = math.nan  # the processor decides which of two NaN a sum has
-    numbers[:, [at, at + 1, at + 2, -2, -1]] = derived
     return numbers

@@ -204,6 +204,7 @@ def replay_into(
     samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
     with ExitStack() as stack:
         twin, put = given.twin(options.causes), None
+        stack.callback(twin.close)
         twin.warm_up()
         if options.with_bag:
             bag_of = result_bag(out / "bag", session.notes, given.topics, given.scene, given.settings)

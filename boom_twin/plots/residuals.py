@@ -181,13 +181,9 @@ def _distributions(axes: Axes, found: list[ResidualDistribution]) -> None:
             axes.stairs(foot + scale * density, EDGES, baseline=foot, fill=True, color=SKY, alpha=0.8, linewidth=0)
             text = f"mean {own.mean:+.2f}\nsd {own.deviation:.2f}"
             axes.text(0.98 * EDGES[-1], foot + 0.97 * (1.0 - gap), text, ha="right", va="top", fontsize=11, color=INK)
-    axes.set_title("against the unit normal")
-    axes.set_xlabel(f"residual / {SIGMA}")
-    axes.set_xlim(EDGES[0], EDGES[-1])
-    axes.set_xticks([-3, 0, 3])
-    axes.set_ylim(0.0, len(found) - gap)
-    axes.set_yticks(range(len(found)), [""] * len(found))
-    axes.tick_params("y", length=0)
+    axes.set(title="against the unit normal", xlabel=f"residual / {SIGMA}", xticks=[-3, 0, 3], yticks=range(len(found)))
+    axes.set(xlim=EDGES[[0, -1]], ylim=(0.0, len(found) - gap))
+    axes.tick_params("y", length=0, labelleft=False)
     axes.spines["left"].set_visible(False)
 
 

@@ -104,10 +104,9 @@ def _part_titles_and_legends(figure: Any) -> None:
 
     for axes in figure.axes:
         legend, text = axes.get_legend(), axes.get_title(loc="left")
-        titles = [each for each in axes.get_children() if isinstance(each, Text) and text and each.get_text() == text]
-        box = None if legend is None else legend.get_window_extent()
-        for title in titles:
-            if box is not None and box.overlaps(title.get_window_extent()):
+        for title in axes.get_children() if legend and text else ():
+            box = legend.get_window_extent()
+            if isinstance(title, Text) and title.get_text() == text and box.overlaps(title.get_window_extent()):
                 axes.set_title(text, loc="left", pad=6.0 + 72.0 / DPI * (box.y1 - axes.get_window_extent().y1))
 
 

@@ -21,6 +21,7 @@ from ..types import Array
 from .schema import Base, JointGeometry, Scene, Section
 
 RANGE_SAMPLES = 721  # angles of a joint's range at which it is examined
+_RECORD = np.dtype((np.record, LINKAGE))
 MARGIN = math.radians(1.0)  # beyond range_deg: strokes at the ends, with their sensors' noise, still have an angle
 
 
@@ -31,7 +32,7 @@ def linkage(scene: Scene, index: int) -> np.record:
 
 def linkage_of(joint: JointGeometry, base: Base | None, first: Section | None) -> np.record:
     """Return the geometry of a joint from its parts; kind A needs the base and the first section, the others neither."""
-    row = np.zeros(1, LINKAGE).view(np.recarray)
+    row = np.zeros(1, _RECORD)
     if joint.kind == "A":
         pin, pivot = base.cylinder_pin, base.pivot  # type: ignore[union-attr]
         row["mount"] = DIRECT
@@ -55,7 +56,9 @@ def linkage_of(joint: JointGeometry, base: Base | None, first: Section | None) -
 
 def stroke_curve(scene: Scene, index: int, angles: Array) -> Array:
     """Return strokes (m) of joint `index` at relative `angles` (rad), shape as `angles`; NaN where the links do not close."""
-    return joint_curve(linkage(scene, index), np.atleast_1d(angles)).lengths - scene.joints[index].cylinder.closed_length
+    with np.errstate(invalid="ignore"):
+        lengths, _ = cylinder_length(_plain(linkage(scene, index)), np.atleast_1d(angles))
+    return np.asarray(lengths - scene.joints[index].cylinder.closed_length)
 
 
 class JointCurve(NamedTuple):
@@ -66,8 +69,9 @@ class JointCurve(NamedTuple):
     between: Array  # angle of the links at Q, 0 (a dead centre) to 90 deg; 90 for kind A
 
 
-def joint_curve(row: np.record, angles: Array) -> JointCurve:
+def joint_curve(record: np.record, angles: Array) -> JointCurve:
     """Return the curve of a joint at `angles` (rad)."""
+    row = _plain(record)
     with np.errstate(invalid="ignore"):
         lengths, slopes = cylinder_length(row, angles)
         if row.mount == DIRECT:
@@ -196,7 +200,7 @@ class PassiveJoints:
 
 def _plain(row: np.record) -> SimpleNamespace:
     """Return the fields of a record as Python numbers, which cost a tenth to read."""
-    return SimpleNamespace(**{name: row[name].item() for name in LINKAGE.names or ()})
+    return SimpleNamespace(**dict(zip(LINKAGE.names or (), row.item(), strict=True)))
 
 
 def _swivel_a(row: SimpleNamespace, phi: float) -> float:
@@ -284,7 +288,7 @@ def joint_pins(scene: Scene, i: int, phi: Array) -> dict[str, Array]:
 
     The rod pin is ``Q`` in kind B1, ``R`` in the other six-bars, ``rod_pin`` in kind A. NaN where the links do not meet.
     """
-    row = linkage(scene, i)
+    row = _plain(linkage(scene, i))
     e = np.asarray(_complex(turned(phi, row.ex, row.ey)))
     pins = {"the pivot": np.zeros_like(e), "C" if i else "cylinder_pin": np.full_like(e, complex(row.cx, row.cy))}
     if i == 0:

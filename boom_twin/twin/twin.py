@@ -169,7 +169,7 @@ class Twin(SampleTaker):
             self._fault_twins.begin()
 
     def close(self) -> None:
-        """End the process of a live twin that names causes; no sample may follow."""
+        """End threads and process of a twin that names causes; no sample may follow."""
         if self._fault_twins is not None:
             self._fault_twins.close()
 

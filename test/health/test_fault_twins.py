@@ -1,6 +1,7 @@
 """Causes named by fault twins in bundled sessions, read with their own scene and with scenes of a stiffer boom."""
 
 import json
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -35,8 +36,10 @@ def stiffer(cause):
 
 @pytest.mark.parametrize("bag", ["arch_session", pytest.param("pump_session", marks=pytest.mark.slow)])
 def test_a_boom_as_its_scene_has_no_cause(tmp_path, bag):
-    """A healthy session gives no alarm, quiet or under a pump that the model does not know."""
+    """A healthy session gives no alarm, quiet or under a pump that the model does not know; no thread is left."""
+    before = threading.active_count()
     assert alarms_of(tmp_path, load_scene(), "--causes", bag=bag) == []
+    assert threading.active_count() <= before
 
 
 @pytest.mark.parametrize(
