@@ -14,7 +14,7 @@ from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..errors import UsageError
 from ..kernels.elements.beam_shapes import integrals_to, rotations_at
-from ..kernels.jit import inner
+from ..kernels.jit import inner, kernel
 from ..kernels.tables import BEAM, FRAME_ANGLE, JOINT_A, JOINT_B, OFFSET
 from ..types import SENSORS, Array, Place, Stream, channels_of, streams_of
 from .delayed import begin_instant, copy_reading
@@ -100,7 +100,7 @@ class Measurement(NamedTuple):
     bending: Array
 
 
-@inner
+@kernel
 def measurement_row(p, f, c, row):
     """Write the row of the measured channel `c`, without its zero, at the prediction.
 

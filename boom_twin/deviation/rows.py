@@ -82,7 +82,7 @@ def spread_of(row, covariance, gain, size):
                 gain[i] += one * first[i]
 
 
-@inner
+@kernel
 def column_row(p, columns, at, scale, row):
     """Write the row of a quantity that changes by `scale` times a column of `columns` (c, ..) a state, see `Posture`."""
     n, m = p.drives.shape[0], p.modes[0]
@@ -169,7 +169,7 @@ def rate_row(p, at, row):
         row[drive + n + i] = p.readings[2 + i, at]
 
 
-@inner
+@kernel
 def acceleration_row(p, at, row):
     """Write the row of the acceleration of column `at` of `Posture.readings`, less what its curved way needs at its speed."""
     n, m = p.drives.shape[0], p.modes[0]

@@ -152,13 +152,9 @@ class KernelCache:
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         from numba import __version__
-        from numba.core.codegen import CPUCodeLibrary, JitEngine
         from numba.core.compiler import CompileResult
-        from numba.core.serialize import dumps
 
         self._rebuild, self._reduce = CompileResult._rebuild, CompileResult._reduce
-        self._dumps = dumps
-        _ = CPUCodeLibrary._get_module_for_linking, JitEngine.is_symbol_defined  # what loading stands in for
         self._name, self._folder = f"{function.__module__}.{function.__qualname__}", folder
         self._version = (__version__, sys.implementation.cache_tag, function.__code__.co_code)
 
@@ -191,7 +187,7 @@ class KernelCache:
         if compiled.lifted or library.has_dynamic_globals or library._compiled_object is None:
             return
         with suppress(OSError):
-            kept = pickle.dumps((_symbols(library), library.callee, library.calls, self._dumps(self._reduce(compiled))))
+            kept = pickle.dumps((_symbols(library), library.callee, library.calls, pickle.dumps(self._reduce(compiled))))
             write_checked(self._path(signature, compiled.codegen), kept)
 
     def enable(self) -> None:

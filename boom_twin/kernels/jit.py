@@ -11,7 +11,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
-from importlib import import_module
 from pathlib import Path
 from threading import Lock
 from typing import Any, TypeVar
@@ -24,7 +23,6 @@ from .compiled_cache import SUFFIX, KernelCache, cache_folder, claim, fault_of
 Fields = TypeVar("Fields")
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
-DOCUMENTED = frozenset({"nogil", "error_model"})
 COMPILING = "compiling the model, about a minute; done once for this version and kept in %s"
 NOT_KEPT = "compiling the model, about a minute each time, because compiled code is not kept: %s"
 LAYOUT = 0x1 | 0x2 | 0x100 | 0x400
@@ -83,15 +81,6 @@ def _register_references() -> None:
                 del _UNREGISTERED[0]
 
 
-def _known(options: dict[str, Any]) -> dict[str, Any]:
-    """Return the options that this numba has; without those that are not documented it only compiles slower code."""
-    try:
-        from numba.core.cpu import CPUTargetOptions
-    except ImportError:
-        CPUTargetOptions = None
-    return {name: value for name, value in options.items() if name in DOCUMENTED or hasattr(CPUTargetOptions, name)}
-
-
 def _kind(value: Any) -> Any:
     """Return all that numba's type of an argument depends on, fifty times as fast as that type."""
     if isinstance(value, np.ndarray):
@@ -134,7 +123,7 @@ class Kernel:
         """numba's object, made on first use."""
         numba = _numba()
         _register_references()
-        dispatcher = numba.njit(**_known({**OPTIONS, **self._options}), **self._compiler())(self.py_func)
+        dispatcher = numba.njit(**OPTIONS, **self._options, **self._compiler())(self.py_func)
         if self._cached and not numba.config.DISABLE_JIT and (folder := _folder()) is not None:
             try:
                 dispatcher._cache = KernelCache(self.py_func, folder)
@@ -203,26 +192,6 @@ class Inner(Kernel):
         return self.py_func(*arguments)
 
 
-class _Intrinsic:
-    """A function of a module that is imported when a kernel that calls it is compiled; `plain` is what it is in Python."""
-
-    def __init__(self, module: str, name: str, plain: Callable[..., Any]) -> None:
-        self._module, self._name, self._plain = module, name, plain
-
-    def __call__(self, *arguments: Any) -> Any:
-        return self._plain(*arguments)
-
-    @property
-    def _numba_type_(self) -> Any:
-        function = getattr(import_module(self._module, __package__), self._name)
-        from numba.core.registry import cpu_target
-
-        return cpu_target.typing_context.resolve_value_type(function)
-
-
-_copy_fields = _Intrinsic(".references", "copy_fields", lambda fields, room: 0)
-
-
 def kernel(function: Callable[..., Any]) -> Kernel:
     """Compile `function`: nopython, cached on disk, without the interpreter's lock, no exceptions for division."""
     return Kernel(function)
@@ -233,18 +202,16 @@ def inner(function: Callable[..., Any]) -> Inner:
     return Inner(function, forceinline=True, no_cpython_wrapper=True)
 
 
-@kernel
-def write_fields(fields, room):
-    """Copy a named tuple's fields to bytes, see `boom_twin.kernels.references.copy_fields`."""
-    return _copy_fields(fields, room)
-
-
 def hold(value: Any) -> Any:
     """Return a stand-in for a named tuple that compiled code takes by reference; anything else as it is.
 
     Its fields are written once, here, and not with every call. It stands for this very tuple: what its arrays hold may change.
     """
-    if type(value) not in _BY_REFERENCE or not write_fields.is_compiled:
+    if type(value) not in _BY_REFERENCE:
+        return value
+    from .references import write_fields
+
+    if not write_fields.is_compiled:
         return value
     _register_references()  # the class may have come after the first kernel was made
     kept, room = value._make(map(hold, value)), np.zeros(0, np.uint8)

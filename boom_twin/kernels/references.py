@@ -17,7 +17,6 @@ import hashlib
 from typing import Any
 
 from llvmlite import ir
-from numba.core import cgutils
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     NativeValue,
@@ -31,7 +30,7 @@ from numba.extending import (
 )
 from numba.types import NamedTuple, Type, int64
 
-from .jit import HeldFields
+from .jit import HeldFields, kernel
 
 TUPLE_FLAG = 1 << 26  # Py_TPFLAGS_TUPLE_SUBCLASS
 
@@ -67,7 +66,12 @@ class ReferenceAttribute(AttributeTemplate):
 @lower_getattr_generic(Reference)
 def field_of(context: Any, builder: Any, of: Reference, address: Any, name: str) -> Any:
     """Load a field."""
-    return _load(builder, cgutils.gep_inbounds(builder, address, 0, of.fields.fields.index(name)))
+    return _load(builder, _part(builder, address, of.fields.fields.index(name)))
+
+
+def _part(builder: Any, address: Any, i: int) -> Any:
+    """Emit the address of part `i` of an aggregate."""
+    return builder.gep(address, [ir.IntType(32)(0), ir.IntType(32)(i)], inbounds=True)
 
 
 def _load(builder: Any, address: Any) -> Any:
@@ -76,7 +80,7 @@ def _load(builder: Any, address: Any) -> Any:
     if isinstance(kind, (ir.LiteralStructType, ir.ArrayType)):
         value = ir.Constant(kind, ir.Undefined)
         for i in range(len(kind)):
-            value = builder.insert_value(value, _load(builder, cgutils.gep_inbounds(builder, address, 0, i)), i)
+            value = builder.insert_value(value, _load(builder, _part(builder, address, i)), i)
         return value
     loaded = builder.load(address)
     loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
@@ -93,25 +97,27 @@ def _written(builder: Any, address: Any) -> Any:
 def unbox_reference(of: Reference, value: Any, c: Any) -> NativeValue:
     """Write the fields of a Python tuple where the call can read them, or take the address of what was written before."""
     builder, kind = c.builder, c.context.get_value_type(of.fields)
-    room = cgutils.alloca_once(builder, kind)
-    address = cgutils.alloca_once_value(builder, room)
-    failed = cgutils.alloca_once_value(builder, cgutils.false_bit)
+    with builder.goto_entry_block():
+        room, address, failed = map(builder.alloca, (kind, kind.as_pointer(), ir.IntType(1)))
+    builder.store(room, address)
+    builder.store(ir.IntType(1)(0), failed)
     with builder.if_else(_is_tuple(c, value)) as (is_tuple, is_held):
         with is_tuple:
             for i, each in enumerate(of.fields.types):
                 field = c.unbox(each, c.pyapi.tuple_getitem(value, i))
-                builder.store(field.value, cgutils.gep_inbounds(builder, room, 0, i))
+                builder.store(field.value, _part(builder, room, i))
                 builder.store(builder.or_(builder.load(failed), field.is_error), failed)
         with is_held:
             builder.store(builder.bitcast(c.pyapi.long_as_voidptr(value), kind.as_pointer()), address)
-            builder.store(cgutils.is_not_null(builder, c.pyapi.err_occurred()), failed)
+            error = c.pyapi.err_occurred()
+            builder.store(builder.icmp_unsigned("!=", error, error.type(None)), failed)
     return NativeValue(_written(builder, builder.load(address)), is_error=builder.load(failed))
 
 
 def _is_tuple(c: Any, value: Any) -> Any:
     """Emit the test that a Python object is a tuple, by the flag that Python gives that class and its subclasses."""
-    word = c.pyapi.ulong
-    flags_of = cgutils.get_or_insert_function(c.builder.module, ir.FunctionType(word, [c.pyapi.pyobj]), "PyType_GetFlags")
+    word, module, name = c.pyapi.ulong, c.builder.module, "PyType_GetFlags"
+    flags_of = module.globals.get(name) or ir.Function(module, ir.FunctionType(word, [c.pyapi.pyobj]), name)
     kind = c.pyapi.object_type(value)
     flags = c.builder.call(flags_of, [kind])
     c.pyapi.decref(kind)
@@ -126,10 +132,18 @@ def copy_fields(_: Any, fields: Any, room: Any) -> Any:
         address, given = arguments[0], context.make_array(signature.args[1])(context, builder, arguments[1])
         size = ir.Constant(ir.IntType(64), context.get_abi_sizeof(address.type.pointee))
         with builder.if_then(builder.icmp_signed(">=", given.nitems, size)):
-            cgutils.raw_memcpy(builder, builder.bitcast(given.data, address.type), address, size, 1)
+            places = [builder.bitcast(each, ir.IntType(8).as_pointer()) for each in (given.data, address)]
+            copy = builder.module.declare_intrinsic("llvm.memcpy", [places[0].type, places[1].type, size.type])
+            builder.call(copy, [*places, size, ir.IntType(1)(0)])
         return size
 
     return int64(fields, room), write
+
+
+@kernel
+def write_fields(fields, room):
+    """Copy a named tuple's fields to bytes, see `copy_fields`."""
+    return copy_fields(fields, room)
 
 
 def register(kind: type) -> None:

@@ -17,8 +17,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..elements.cylinder import AXIAL, END_C, END_R, cylinder_terms
-from ..elements.linkage import LINK_L, LINK_R
-from ..elements.pin_contact import LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD_END_PIN
+from ..elements.linkage import LINK_L
+from ..elements.pin_contact import LINK_L_PIN, PIVOT, Q_PIN, ROD_END_PIN
 from ..jit import inner
 from ..plane_algebra import factorise, rotated, substitute
 from ..tables import Z_FORCE_B, Z_LAMBDA, Z_LINK_L, Z_LINK_R, Z_SECTION
@@ -163,15 +163,6 @@ def _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h):
 
 
 @inner
-def _add_side(t, state, work, index, side, motion, drive, drive_rate, g, h):
-    """Link L or R of joint `index`, with the cylinder if it pushes on it."""
-    linkage = t.linkages[index]
-    _add_link(t, t.joints[index], linkage, side, state.turns[index], motion, work.position, g, h)
-    if linkage.mount == side:
-        _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h)
-
-
-@inner
 def _add_cut(work, m, behind, renew, g, h):
     """Section i: x, y of its pivot, its angle, and what is carried already, which stands from place `behind` on."""
     for i in range(m):
@@ -194,26 +185,25 @@ def close_loop(t, state, work, motion, drive, drive_rate, index, operation, m):
         g[i] = 0.0
         for j in range(i + 1 if motion.renew else 0):
             h[i, j] = 0.0
-    if joint.clearances == 0:
-        _add_side(t, state, work, index, LINK_L, motion, drive, drive_rate, g, h)
-        _add_side(t, state, work, index, LINK_R, motion, drive, drive_rate, g, h)
-        _add_cut(work, m, behind, motion.renew, g, h)
-        _add_closure(joint, linkage, state.z, turns, motion.renew, g, h)
-        if motion.renew:
-            return _condense_loop(work, index, operation, INNER, size)
-        _condense_loop_forces(work, operation, INNER, size)
-        return True
-    keep_rows(work.apart, g, h, size)
-    _add_side(t, state, work, index, LINK_L, motion, drive, drive_rate, g, h)
-    take_rows(t, work, joint, LINK_L_PIN, size, g, h)
-    keep_rows(work.apart, g, h, size)
-    _add_side(t, state, work, index, LINK_R, motion, drive, drive_rate, g, h)
-    take_rows(t, work, joint, LINK_R_PIN, size, g, h)
+    has_play = joint.clearances > 0
+    for i in range(2):
+        if has_play:
+            keep_rows(work.apart, g, h, size)
+        _add_link(t, joint, linkage, LINK_L + i, turns, motion, work.position, g, h)
+        if linkage.mount == LINK_L + i:
+            _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h)
+        if has_play:
+            take_rows(t, work, joint, LINK_L_PIN + i, size, g, h)
     _add_cut(work, m, behind, motion.renew, g, h)
-    take_rows(t, work, joint, PIVOT, size, g, h)
+    if has_play:
+        take_rows(t, work, joint, PIVOT, size, g, h)
     _add_closure(joint, linkage, state.z, turns, motion.renew, g, h)
-    free_pins(t, state, work, joint, g, h)
-    return _condense_loop(work, index, operation, behind - SECTION, size)
+    if has_play:
+        free_pins(t, state, work, joint, g, h)
+    if motion.renew:
+        return _condense_loop(work, index, operation, behind - SECTION, size)
+    _condense_loop_forces(work, operation, behind - SECTION, size)
+    return True
 
 
 @inner
