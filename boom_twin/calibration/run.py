@@ -14,8 +14,9 @@ from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..scene.edit import with_parameters
 from ..scene.schema import Scene
+from ..twin.blocks import CODES, ResidualBlock, block_of
 from ..twin.twin import Twin
-from ..types import SENSORS, Array, Residuals, Stream, StrokeReading
+from ..types import SENSORS, Array, Stream, StrokeReading, channels_of, streams_of
 from .fit import CalibrationProblem, Fit, InseparableUnknowns, fitted, groups_of
 from .sessions import STREAMS, MeasuredSession, Rigging, read_sessions, rest_periods
 from .unknowns import Choice, Unknown, assumed_of, unknowns_of, usual_names
@@ -225,18 +226,19 @@ def judged(
 
     BagError if the twin predicts nothing there.
     """
+    batch, samples, joints = 10_000, session.samples(zeros), len(scene.joints)  # samples that are taken at once
     twin = Twin(scene, rigging.settings, rigging.mounts, reads=rigging.reads, places=rigging.places)
-    found: dict[Stream, list[Residuals]] = {stream: [] for stream in Stream}
-    for sample in session.samples(zeros):
-        for residuals in (each for report in twin.update(sample).all for each in report.residuals):
-            if residuals.stamp >= start:
-                found[residuals.stream].append(residuals)
-    groups = [group for group in found.values() if group]
-    if not groups:
+    blocks = (block_of(samples[first : first + batch], joints) for first in range(0, len(samples), batch))
+    found = ResidualBlock(*map(np.concatenate, zip(*(twin.take(block).residuals for block in blocks), strict=True)))
+    names, columns = list[str](), list[Array]()
+    for stream, channels in channels_of(joints, streams_of(rigging.places)).items():
+        own = (found.streams == CODES[stream]) & (found.stamps >= start)
+        if own.any():
+            names += channels
+            columns += [*(found.values[own] / found.sigmas[own]).T[: len(channels)]]
+    if not names:
         raise BagError(f"{session.name}: the twin predicts nothing in the part held out. Are the strokes within the travel?")
-    names = tuple(name for group in groups for name in group[0].names)
-    columns = [np.array([np.divide(each.values, each.sigmas) for each in group]).T for group in groups]
-    return HeldOutResult(names, np.array([_rms(column) for group in columns for column in group]))
+    return HeldOutResult(tuple(names), np.array([_rms(column) for column in columns]))
 
 
 def _rms(values: Array) -> float:
