@@ -25,15 +25,7 @@ SETTLED = round(3.0 * WINDOW / NANO)  # ns below that share before it ends: a me
 
 
 class DeviationMonitor:
-    """Monitor of the slow means of one stream's residuals.
-
-    Parameters
-    ----------
-    stream : Stream
-    scene : Scene
-    settings : Settings
-        Settings with the limits.
-    """
+    """Monitor of the slow means of one stream's residuals, with the limits of the settings."""
 
     def __init__(self, stream: Stream, scene: Scene, settings: Settings) -> None:
         self._stream, self._names = stream, channels_of(len(scene.joints))[stream]

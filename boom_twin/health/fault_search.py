@@ -80,7 +80,7 @@ class FaultSearch:
     make : callable
         Hypothesis -> its twin.
     settings : Settings
-        With the posterior probability required to name a cause, and the errors of the scene.
+        With `name_odds` and `scene_error`.
     reads : StrokeReading
         Quantity that drives the model.
     """
@@ -116,8 +116,7 @@ class FaultSearch:
     def _warm(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower] | None:
         """Return the hypothesis of these faults, and its twin after the newest seconds; None for an impossible boom."""
         try:
-            each = hypothesis(self._scene, faults)
-            twin = self._made(each)
+            each, twin = self._made(faults)
             for second in list(self._recent)[-WARM_UP:]:
                 _feed(twin, each, second)
         except BoomTwinError:  # such as one with a part too soft to hold it
@@ -147,11 +146,12 @@ class FaultSearch:
         self._decision, self._age = Evidence(self._scene, self._faults, self._settings), 0
         self._evidence = np.array([twin.evidence for twin in self._twins])
 
-    def _made(self, each: Hypothesis) -> Follower:
+    def _made(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower]:
+        each = hypothesis(self._scene, faults)
         twin = self._make(each)
         if self._change is not None:
             twin.requests.repeat(_changed(self._change, each))
-        return twin
+        return each, twin
 
     def close(self) -> None:
         """End the threads; a call that they work for fails."""
@@ -305,8 +305,7 @@ class FaultSearch:
 
     def _repeated(self, fault: Fault) -> Iterator[tuple[int, Follower]]:
         """Run a twin with a fault over the recent seconds; yield each stamp with the twin after that second."""
-        each = hypothesis(self._scene, (*self._named, fault))
-        twin = self._made(each)
+        each, twin = self._made((*self._named, fault))
         for second in self._recent:
             _feed(twin, each, second)
             yield second.stamp, twin
