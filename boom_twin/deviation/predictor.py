@@ -25,7 +25,7 @@ from ..scene.kinematics import RigidJoints
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading, channels_of, streams_of
-from .channels import DRIFT_FIRST, LAG_FIRST, READS_ACCELERATION, READS_MOMENT, TIP_IMU_STATES, measurement_of
+from .channels import DRIFT_FIRST, LAG_FIRST, READS_ACCELERATION, READS_FORCE, READS_MOMENT, TIP_IMU_STATES, measurement_of
 from .estimate_row import MODES
 from .kalman import FORCE_ZERO
 from .models import start_models
@@ -255,8 +255,8 @@ class BoomPredictor:
     def zeros(self, channels: Collection[str]) -> tuple[Array, Array]:
         """Return the estimated zeros of these sensors, in their units, and their variances, in the order of the states.
 
-        The variances are at given mount and scale of the tip IMU, which do not change. Errors of the modelled acceleration
-        look like the zero of an IMU, and are in its variance.
+        The variances are at given mount and scale of the tip IMU, which do not change. What the model has wrong of an
+        acceleration, or of a force by errors of the scene, looks like a zero, and is in its variance.
         """
         f, first, places = self.filters, zero_place(self.posture), self._zeros_of(channels)
         covariance, at, fixed = f.spread[ESTIMATE], first + np.array(places), first + np.array([2, 3])
@@ -265,6 +265,8 @@ class BoomPredictor:
         for row in self.posture.channels:
             if row.kind == READS_ACCELERATION and row.zero in places:
                 variances[places.index(row.zero)] += INEXACT**2 * f.shaking[row.site, 0]
+            elif row.kind == READS_FORCE and row.zero in places:
+                variances[places.index(row.zero)] += (f.noise.scene_error * f.pulls[row.index]) ** 2
         return f.mean[ESTIMATE, at], variances
 
     @property
