@@ -249,8 +249,8 @@ class FaultSearch:
             changed, spread = self._change_of_zero(fault, onset)
             spread = math.hypot(spread, usual)
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
-            is_sure = 0.5 * (changed.size / spread) ** 2 > sure
-            return (changed, spread, onset) if is_sure and abs(changed.size) >= least else None
+            certain = NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - odds) / len(self._faults))  # that none of them is that far off
+            return (changed, spread, onset) if abs(changed.size) > max(least, certain * spread) else None
         least = NormalDist().inv_cdf(0.5 + 0.5 * odds) * usual
         healthy = self._course(fault._replace(size=least), onset)
 
