@@ -249,7 +249,7 @@ class FaultSearch:
             changed, spread = self._change_of_zero(fault, onset)
             spread = math.hypot(spread, usual)
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
-            certain = NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - odds) / len(self._faults))  # that none of them is that far off
+            certain = NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - odds) / len(self._faults))  # for all faults together (Bonferroni)
             return (changed, spread, onset) if abs(changed.size) > max(least, certain * spread) else None
         least = NormalDist().inv_cdf(0.5 + 0.5 * odds) * usual
         healthy = self._course(fault._replace(size=least), onset)
