@@ -21,7 +21,6 @@ import numpy as np
 from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
-from ..system.processes import usable_cores
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
 from .causes import CAME_BACK, MEMORY, TEMPER, Evidence, Fault, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
 from .creep import SPAN, CreepMonitor
@@ -91,9 +90,10 @@ class FaultSearch:
         make: Callable[[Hypothesis], Follower],
         settings: Settings,
         reads: StrokeReading = StrokeReading.LENGTH,
+        threads: int = 1,  # among which the twins are shared
     ) -> None:
         self._scene, self._make, self._settings, self._reads = scene, make, settings, reads
-        self._cores = ThreadPoolExecutor(usable_cores(), "fault twins")  # twins do not depend on each other
+        self._cores = ThreadPoolExecutor(threads, "fault twins")  # twins do not depend on each other
         self._recent: deque[Second] = deque(maxlen=MEMORY)
         self._change: Change | None = None
         self._creep = CreepMonitor(scene)

@@ -17,6 +17,7 @@ import numpy as np
 from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..system.child_call import ChildCall, ChildEndedError
+from ..system.processes import usable_cores
 from ..types import SECOND, Alarm, Array, Change, StrokeReading
 from .causes import Hypothesis
 from .fault_search import FaultSearch, Follower, Second
@@ -29,8 +30,8 @@ DELAY = 2 * SECOND  # ns from the end of a second to its verdict
 class FaultTwins:
     """Samples of each second for a `FaultSearch`, and its alarms when they are due.
 
-    `is_live`: the search runs in another process, and the caller must not wait. On a busy processor verdicts then come later
-    than `DELAY`. Other parameters: see `FaultSearch`.
+    `is_live`: the search runs in another process, in one thread, and the caller must not wait. On a busy processor verdicts
+    then come later than `DELAY`. Other parameters: see `FaultSearch`.
     """
 
     def __init__(
@@ -41,7 +42,7 @@ class FaultTwins:
         is_live: bool = False,
         reads: StrokeReading = StrokeReading.LENGTH,
     ) -> None:
-        self._given, self._is_live = (scene, make, settings, reads), is_live
+        self._given, self._is_live = (scene, make, settings, reads, 1 if is_live else usable_cores()), is_live
         self._lasting: dict[str, Alarm] = {}
         self._pending: list[Any] = []
         self._second = 0  # whole seconds of the pending samples' stamps
