@@ -83,9 +83,10 @@ SENTENCES = {
     ),
     "more line_fill": Sentence("the pipe line holds more than the line fill that is set", "Set the line fill"),
     "less line_fill": Sentence("the pipe line holds less than the line fill that is set", "Set the line fill"),
-    "off": Sentence("{thing}, or the length transducer beside it, reads wrong", "Compare both at rest, then set the zero"),
-    "off cylinder_force": Sentence("{thing} reads wrong", "Check the sensor's zero and scale"),
-    "off tip_imu": Sentence("{thing} reads wrong", "Check the sensor's zero and scale"),
+    "off": Sentence("{thing} reads wrong", "Check the sensor's zero and scale"),
+    "off joint": Sentence(
+        "{thing}, or the length transducer beside it, reads wrong", "Compare both at rest, then set the zero"
+    ),
     "gap": Sentence("cylinder lengths were missing", "Check cable and driver of the length transducers"),
     "gap joint_angles": Sentence("joint angles were missing", "Check cable and driver of the angle sensors"),
     "clock": Sentence("a clock was set", "No action is needed if this was intended"),

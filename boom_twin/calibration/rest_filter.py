@@ -136,8 +136,6 @@ def start_rest(p, f, x, covariance, loads, zero2):
     """Set the state to rest at the posture; the covariance allows for vibration, and for drives beside it."""
     n, m, size, zero = p.drives.shape[0], p.modes[0], all_states(p), zero_place(p)
     load, drive = force_place(p), drive_place(p)
-    for i in range(n):
-        f.jerk[i] = 0.0
     first_variances(p, f, f.gain)
     for i in range(size):
         x[i] = 0.0
@@ -157,5 +155,6 @@ def start_rest(p, f, x, covariance, loads, zero2):
     for i in range(n):
         x[drive + i], covariance[drive + i, drive + i] = p.drives[i], DRIVE * DRIVE
         covariance[zero + 4 + i, zero + 4 + i] = zero2[2 + i]
+        f.jerk[i] = 0.0
     for k in range(f.drift.shape[0]):
         f.drift[k] = 0.0

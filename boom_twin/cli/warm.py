@@ -40,7 +40,7 @@ def run(args: Namespace) -> int:
         tell("compiling the kernels of node, replay and statics with numba, one at a time: 40 s to some minutes ..")
     scene = load_scene()
     Twin(scene, health=True).warm_up()
-    ReportEncoder(scene, Settings())
+    ReportEncoder(scene, Settings())  # compiles the kernel of its numbers
     kernels = len(list(folder.glob(f"*{SUFFIX}")))
     told = f"{kernels - before} compiled now" if kernels > before else "nothing to compile"
     print(f"{kernels} kernels in {folder}, {_size(folder):.1f} MB; {told}, {time.perf_counter() - began:.1f} s")

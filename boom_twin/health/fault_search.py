@@ -174,7 +174,7 @@ class FaultSearch:
         if leaks:
             self._decide_anew()
         doubts = self._twins[0].doubts
-        deque(self._cores.map(_feed, self._twins, self._hypotheses, repeat(second)), 0)
+        list(self._cores.map(_feed, self._twins, self._hypotheses, repeat(second)))  # waits for all, and raises what one raised
         if self._twins[0].doubts > doubts or math.isnan(self._twins[0].evidence):
             self._recent.clear()  # it has half forgotten zeros and load; any other would gain by what it still knows
             self._begin()

@@ -186,7 +186,7 @@ def close_loop(t, state, work, motion, drive, drive_rate, index, operation, m):
         for j in range(i + 1 if motion.renew else 0):
             h[i, j] = 0.0
     has_play = joint.clearances > 0
-    for i in range(2):
+    for i in range(2):  # links L and R
         if has_play:
             keep_rows(work.apart, g, h, size)
         _add_link(t, joint, linkage, LINK_L + i, turns, motion, work.position, g, h)
