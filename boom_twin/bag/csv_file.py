@@ -33,7 +33,6 @@ class CsvFile(SessionFile):
     joints: int
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
-        """Yield messages as in `SessionFile`, in the order of log times."""
         numbers = {channel.topic: channel.id for channel in self.channels.values()}
         for block in encoded_blocks(self.readings, load_topics(), self.joints):
             found = [(place, numbers[rows.key], data) for rows in block.rows for place, data in zip(*rows[1:], strict=True)]

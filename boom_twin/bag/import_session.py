@@ -46,7 +46,6 @@ class ReadTable(NamedTuple):
 
     @property
     def span_text(self) -> str:
-        """First and last stamp in words."""
         start, end = self.span
         if not self.times.is_absolute:
             return f"{start * NANO:g} to {end * NANO:g} s"
@@ -210,7 +209,6 @@ def _readings(
 
 
 def _write(out: Path, readings: list[Readings], topics: Topics, joints: int, origin: str) -> dict[str, int]:
-    """Write all messages and return their counts by topic."""
     counts: Counter[str] = Counter()
     inputs = {topics.inputs[each.stream].absolute: topics.inputs[each.stream] for each in readings}
     with MessageWriter(out, inputs, {"origin": origin}) as bag:

@@ -45,7 +45,6 @@ class Tally:
     _before: int | None = None
 
     def add(self, log_time: int, data: bytes) -> None:
-        """Add one message to the statistics."""
         before_this, self.last = self.last, log_time
         if self.count == 0:
             self.first = log_time

@@ -207,7 +207,6 @@ class _OpenChunk:
         self.start = self.end = 0  # first and last log time, ns
 
     def add(self, channel: int, log_time: int, record: bytes) -> None:
-        """Append one message."""
         self._extend_span(log_time, log_time)
         self.entries.setdefault(channel, bytearray()).extend(_INDEX_ENTRY.pack(log_time, len(self.content)))
         self.content += record

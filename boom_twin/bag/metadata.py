@@ -211,7 +211,6 @@ class Recorded:
 
     @property
     def metadata(self) -> TopicMetadata:
-        """Entry of the topic in ``metadata.yaml``."""
         return TopicMetadata(
             name=self.topic,
             type=self.type,

@@ -146,7 +146,6 @@ class Ros1File(SessionFile):
     """Content of one .bag file, which has no checksums."""
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
-        """Yield messages as in `SessionFile`, in the order of log times."""
         convert = jazzy().ros1_to_cdr
         with _reader(self.path) as reader:
             for connection, time, data in reader.messages():

@@ -176,7 +176,6 @@ def _copy(
     outcome: Recovery,
     metadata: BagMetadata | None,
 ) -> None:
-    """Copy the messages of one file."""
     own: dict[int, int] = {}
     for piece in scan_damaged(file, definitions.channels):
         if isinstance(piece, DamagedBytes):

@@ -198,7 +198,6 @@ class SessionScene:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the text."""
         return sha256(self.text)
 
 

@@ -77,7 +77,6 @@ class BagWriter:
 
     @property
     def file(self) -> Path:
-        """Path of the open file."""
         return self.directory / file_name(len(self._files))
 
     def add(self, *topics: Recorded) -> list[int]:
@@ -183,7 +182,6 @@ class BagWriter:
         bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata, self.sync)
 
     def _finish(self) -> None:
-        """Complete the open file."""
         self._writer.finish()
         self.sync(self.flush())
         self._completed += self.size
@@ -236,7 +234,6 @@ class MessageWriter:
         self.write_encoded(key, stamp_ns, bytes(jazzy().serialize_cdr(msg, self._types[key])))
 
     def write_encoded(self, key: str, stamp_ns: int, data: bytes) -> None:
-        """Append a message that is encoded as CDR."""
         number = self._keys[key]
         self._bag.write(number, stamp_ns, data, sequence=self._bag.counts[number] + 1)
 

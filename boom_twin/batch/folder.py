@@ -140,7 +140,6 @@ class BatchFolder:
         self.folder, self._lock = folder, lock
 
     def replay(self, key: str) -> Path:
-        """Return the folder of the replay of a session."""
         return self.folder / SESSIONS / key
 
     def kept(self, key: str, fingerprint: str) -> Row | None:
@@ -160,7 +159,6 @@ class BatchFolder:
         return dict(row) if row["fingerprint"] == fingerprint else None
 
     def keep(self, row: Row) -> None:
-        """Write a finished row to its file."""
         write_atomic(self.folder / ROWS / f"{row['key']}.json", json.dumps(row | {DIGEST: _digest(row)}) + "\n")
 
     def mark(self, total: int, finished: int) -> None:

@@ -97,7 +97,6 @@ def _by_rig(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
 
 
 def _figures(rows: Sequence[Row], beginnings: tuple[str, ...]) -> list[str]:
-    """Return the names of the figures in these rows that begin so."""
     return sorted({name for row in rows for name in row if name.startswith(beginnings) and not name.endswith("_sigma")})
 
 
@@ -170,7 +169,6 @@ def _is_number(value: object) -> bool:
 
 
 def write_rigs(path: Path, rigs: Sequence[RigSummary]) -> None:
-    """Write the summaries of all rigs as one JSON object, with the list ``rigs``."""
     write_atomic(path, json_text({"rigs": [as_dict(rig) for rig in rigs]}, indent=1) + "\n")
 
 

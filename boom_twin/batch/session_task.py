@@ -150,7 +150,6 @@ def run_task(task: SessionTask) -> Row:
 
 
 def failed(task: SessionTask, reason: str, attempts: int) -> Row:
-    """Return the row of a session without a result."""
     return {**_head(task), "status": FAILED, "reason": reason, "attempts": attempts}
 
 

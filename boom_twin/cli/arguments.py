@@ -39,7 +39,6 @@ def add_place(parser: ArgumentParser) -> Any:
 
 
 def add_file(parser: ArgumentParser, option: str, purpose: str, metavar: str = "FILE") -> None:
-    """Declare an option whose value is a path."""
     parser.add_argument(option, metavar=metavar, type=Path, help=purpose)
 
 
@@ -57,7 +56,6 @@ def add_session(parser: ArgumentParser, params: bool = True, mapping: bool = Tru
 
 
 def window_of(args: Namespace) -> TimeWindow:
-    """Return the part of a session that the arguments name."""
     from ..bag.session_file import TimeWindow
 
     return TimeWindow(args.start, args.duration)
@@ -76,7 +74,6 @@ def add_ros_args(parser: ArgumentParser) -> None:
 
 
 def add_namespace(parser: ArgumentParser, purpose: str) -> None:
-    """Declare ``--namespace``."""
     parser.add_argument("--namespace", type=_namespace, metavar="NAME", default="", help=purpose)
 
 
@@ -181,7 +178,6 @@ def placed_sensors_of(text: str, scene: Scene) -> list[tuple[str, Stream, dict[s
 
 
 def positive(text: str) -> float:
-    """Parse a number above 0."""
     value = not_negative(text)
     if value == 0.0:
         raise ArgumentTypeError(f"{text}: must be > 0")

@@ -86,7 +86,6 @@ def run(args: Namespace) -> int:
 
 
 def summary(name: str, account: Account, warnings: Sequence[Fault], notes: Sequence[Fault]) -> dict[str, Any]:
-    """Return the description of the scene as one flat object."""
     sections, joints, base = account.sections, account.joints, account.scene.base.stiffness
     return {
         "scene": name,
@@ -119,7 +118,6 @@ def summary(name: str, account: Account, warnings: Sequence[Fault], notes: Seque
 
 
 def report(name: str, scene: Scene, account: Account, warnings: Sequence[Fault], notes: Sequence[Fault]) -> list[str]:
-    """Return lines of text for a reader."""
     kinds = " + ".join(joint.kind for joint in scene.joints)
     count = len(account.sections)
     lines = [f"{name}: this scene can be used"]

@@ -18,7 +18,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Replay what is not replayed, and compare."""
     from ..offline.inputs import ReplayOptions
     from ..report.evaluation import evaluated_replay
     from ..report.quantities import as_text, flat, rows_of, side_of

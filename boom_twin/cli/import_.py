@@ -33,7 +33,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Read the files; write the session or print the columns."""
     from ..bag.import_session import import_session
     from ..bag.session_model import SessionSheet, scene_from
     from ..loggers.assignment import ColumnFile, assign, columns_of_options, load_columns

@@ -23,7 +23,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Read the session once and print its content."""
     from ..bag.inspect import inspect
     from ..bag.session_model import mapping_of, strokes_of
     from ..offline.commissioning import wiring_of

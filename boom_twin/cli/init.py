@@ -24,7 +24,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Write the scene."""
     if args.example_table:
         sys.stdout.write((files("boom_twin") / "msg_config" / "boom_table.yaml").read_text(encoding="utf-8"))
         return 0

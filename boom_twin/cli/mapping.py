@@ -21,7 +21,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Print the default mapping, or check a session."""
     if args.check is not None:
         return _check(args)
     remedy = "only with --check BAG; without it, the default mapping is printed. Add --check BAG."
@@ -84,7 +83,6 @@ def as_text(found: Commissioning, text: str, out: Path | None) -> list[str]:
 
 
 def lag_words(lag: float, sigma: float) -> str:
-    """Return a lag in words."""
     if sigma == float("inf"):
         return "not determined: too little moved"
     return f"{1e3 * lag:+.0f} +- {1e3 * sigma:.0f} ms against the strokes"

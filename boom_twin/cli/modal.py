@@ -23,7 +23,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Identify modes, draw diagrams, print a table."""
     import json
 
     import numpy as np

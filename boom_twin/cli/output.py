@@ -24,7 +24,6 @@ def tell(text: str) -> None:
 
 
 def warn(text: str) -> None:
-    """Print a warning on stderr."""
     tell(f"warning: {text}")
 
 
@@ -47,7 +46,6 @@ class QuietStream(TextIOBase):
         return len(text)
 
     def flush(self) -> None:
-        """Flush the complete lines."""
         self._stream.flush()
 
 

@@ -49,7 +49,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Play, and print on stderr what was sent."""
     require_rclpy()
     from ..ros.bag.player import Player
     from ..ros.runtime import ros

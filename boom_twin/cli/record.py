@@ -162,7 +162,6 @@ def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:
 
 
 def long_enough(text: str) -> float:
-    """Parse the length of a file in seconds."""
     shortest_file = 0.1  # s
     value = positive(text)
     if value < shortest_file:

@@ -21,7 +21,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Save a sound session, and print what was saved and what was lost."""
     from ..bag.recover import recover
 
     shown = 20  # faults that are printed one by one

@@ -99,7 +99,6 @@ def summary(proposal: Proposal, most: float) -> dict[str, Any]:
 
 
 def report(scene: Scene, proposal: Proposal, most: float) -> list[str]:
-    """Return lines of text for a reader."""
     off, course, (full, lean) = proposal.deviation, proposal.course, proposal.seconds
     lines = ["", f"Leanest model found that keeps the tip within {_length(most)}"]
     width = max((len(str(edit)) for edit in proposal.edits), default=0)

@@ -44,7 +44,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Replay, draw, and print the result."""
     from ..offline.inputs import ReplayOptions
     from ..offline.sample_table import SampleTable, check_kind, columns_of, table_file
     from ..report.evaluation import evaluated_replay
@@ -116,7 +115,6 @@ def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
 
 
 def as_text(summary: dict[str, Any]) -> list[str]:
-    """Return the lines of a short table."""
     from ..health.sensor_monitor import noise_as_text
     from ..offline.recording import alarm_as_text
 

@@ -79,7 +79,6 @@ def _rates(text: str) -> tuple[float, float, int]:
 
 
 def run(args: Namespace) -> int:
-    """Compute, print, and write what was asked for."""
     from ..analysis.equilibrium import statics
     from ..system.atomic_files import write_atomic
     from ..system.result_folder import RESPONSE, result_folder

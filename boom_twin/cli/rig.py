@@ -60,7 +60,6 @@ class ListFaults(Action):
     """Action that prints the faults and ends, whatever else is given."""
 
     def __call__(self, parser: ArgumentParser, *_: object) -> NoReturn:
-        """See `argparse.Action`."""
         from ..validation.rig.faults import listing
 
         print("\n".join(listing()))
@@ -109,7 +108,6 @@ def _cylinders(text: str | None, scene: Scene) -> list[tuple[float, float]]:
 
 
 def run(args: Namespace) -> int:
-    """Simulate, sample, write."""
     from ..bag.session_model import RIG_ORIGIN, SessionSheet, scene_from
     from ..bag.session_writer import samples_in_rows, write_samples
     from ..offline.ground_truth import FILE_NAME

@@ -15,7 +15,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Print the file."""
     text = default_text() if args.example is None else example_text(args.example)
     sys.stdout.write(with_end_mark(f"{text}\n{clearance_text()}") if args.clearance else text)
     return 0

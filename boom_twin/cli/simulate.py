@@ -50,7 +50,6 @@ def _share(text: str) -> float:
 
 
 def run(args: Namespace) -> int:
-    """Read, simulate, write."""
     from ..analysis.simulate import RHO, simulate
 
     scene = open_scene(args.scene)
@@ -72,7 +71,6 @@ def run(args: Namespace) -> int:
 
 
 def as_json(result: Simulation, out: str) -> dict[str, object]:
-    """Return the figures of a simulation."""
     x, y = result.tip[:, 0], result.tip[:, 1]
     return {
         "out": out,
@@ -90,7 +88,6 @@ def as_json(result: Simulation, out: str) -> dict[str, object]:
 
 
 def as_text(result: Simulation, out: str) -> list[str]:
-    """Return the lines of text with the figures of a simulation."""
     figures = as_json(result, out)
     (x, y), (end_x, end_y) = result.tip[0, :2], result.tip[-1, :2]
     lines = [

@@ -20,7 +20,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Solve and print."""
     from ..analysis.equilibrium import statics
 
     scene = open_scene(args.scene)
@@ -48,7 +47,6 @@ def as_json(result: Equilibrium) -> dict[str, object]:
 
 
 def as_text(result: Equilibrium) -> list[str]:
-    """Return the lines of a short table, one joint a line."""
     (x, y), (dx, dy) = result.tip, result.tip - result.tip_rigid
     lines = [
         f"tip            x {x:.4f} m, y {y:.4f} m",

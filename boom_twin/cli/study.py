@@ -30,7 +30,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Compute and write the report; print its files."""
     from ..system.result_folder import result_folder, study
 
     write: Callable[..., list[Path]] = import_module(f"boom_twin.validation.study.{KINDS[args.kind][0]}").write

@@ -14,7 +14,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Print the document."""
     from ..messages.urdf import urdf
 
     sys.stdout.write(urdf(open_scene(args.scene)))

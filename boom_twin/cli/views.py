@@ -19,7 +19,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Write the files and print their paths."""
     from ..messages.urdf import VIEWS, view_text
 
     args.out.mkdir(parents=True, exist_ok=True)

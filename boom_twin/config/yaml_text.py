@@ -138,7 +138,6 @@ class YamlReader:
         return node.value
 
     def fault(self, place: Place, value: Any, bound: str, remedy: str) -> None:
-        """Note what is not allowed."""
         self.document.faults.append(self.document.fault(place, value, bound, remedy))
 
     def _value(self, node: Node, place: Place) -> Any:

@@ -141,7 +141,6 @@ class StampWindow(Generic[Item]):
 
     @property
     def items(self) -> list[Item]:
-        """Items in the window."""
         return [item for _, item in self._items]
 
 
@@ -152,7 +151,6 @@ class SwingWatch:
         self._places = StampWindow[Array](SWING_WINDOW)
 
     def took(self, report: Report) -> None:
-        """Take a report."""
         p = report.prediction
         if p is not None and self._places.is_due(report.stamp):
             e = report.estimate
@@ -176,7 +174,6 @@ class LoadWatch:
         self._loads = StampWindow[Estimate](LOAD_WINDOW)
 
     def took(self, report: Report) -> None:
-        """Take a report."""
         if self._loads.is_due(report.stamp) and (estimate := report.estimate) is not None:
             self._loads.add(report.stamp, estimate)
 
@@ -272,7 +269,6 @@ class HealthWatch:
 
     @property
     def is_alarmed(self) -> bool:
-        """Return True if an alarm is active."""
         return bool(self._alarms.lasting)
 
     @property
@@ -283,7 +279,6 @@ class HealthWatch:
         return f"judged by health: alarm of {', '.join(channels)}" if channels else ""
 
     def status(self, judge: ComponentJudge) -> Status:
-        """Return the status of the rig's health."""
         self.has_news = False
         alarms, lasting = self._alarms.all, len(self._alarms.lasting)
         judge.note({"alarms": lasting, "not_acknowledged": len(alarms) - lasting + self._before.total()})

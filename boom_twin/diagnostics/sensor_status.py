@@ -92,7 +92,6 @@ class StreamWatch:
         self._stamps, self._values = list[int](), list[Array]()  # of samples
 
     def seen(self, stamp: int) -> None:
-        """Count a message."""
         self.count += 1
         self.newest = stamp
         self._heard = now = self._monotonic()

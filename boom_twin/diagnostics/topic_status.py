@@ -126,7 +126,6 @@ class ReceptionWatch:
         self._before: dict[str, Reception] = {}
 
     def status(self, judge: ComponentJudge, topics: Mapping[str, Reception]) -> Status:
-        """Return the status."""
         for name, each in topics.items():
             self._check(judge, name, each)
         self._before = dict(topics)

@@ -56,7 +56,6 @@ class TwinWatch:
     # -- one message --------------------------------------------------------------------------------------------------
 
     def seen(self, stream: Stream, stamp: int) -> None:
-        """Count a message."""
         self._streams[stream].seen(stamp)
 
     def took(self, sample: Sample, report: Report, duration: float) -> None:

@@ -37,7 +37,6 @@ class ColumnFile(BaseModel):
     columns: dict[str, ChannelColumn | Literal["none"]] = {}
 
     def time_of(self, table: LogTable) -> TimeEntry | None:
-        """Return the given time column of a table."""
         return next((entry for entry in self.time if entry.is_of(table)), None)
 
 

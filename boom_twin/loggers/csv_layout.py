@@ -96,7 +96,6 @@ def split_header(text: str) -> tuple[str, str]:
 
 
 def is_time(name: str) -> bool:
-    """Return True if a column has the name of a time."""
     return bool(re.search(_TIME, _folded(name)))
 
 
@@ -188,7 +187,6 @@ class LoggerLayout(CsvLayout):
 
     @property
     def text(self) -> str:
-        """Layout in words."""
         mark = "decimal comma" if self.is_comma else "decimal point"
         return f"{self.encoding}, separator {SEPARATORS[self.separator]}, {mark}, header in line {self.header_line}"
 

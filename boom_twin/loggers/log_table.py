@@ -62,7 +62,6 @@ class CsvLogTable(LogTable):
         super().__init__(str(path), self._layout.names, self._layout.units, self._layout.text)
 
     def first(self, place: int) -> list[str]:
-        """See `LogTable`."""
         return [row[place] for row in self._layout.samples if place < len(row) and row[place]]
 
     def read(self, numbers: Sequence[int], times: Sequence[int]) -> LogRows:
@@ -126,12 +125,10 @@ class ArrayTable(LogTable):
         super().__init__(source, list(columns), [units.get(name, "") for name in columns], layout)
 
     def first(self, place: int) -> list[str]:
-        """See `LogTable`."""
         values = [value for value in [*self._columns.values()][place][:200].tolist() if value == value]
         return [f"{value:.9g}" if isinstance(value, float) else str(value) for value in values]
 
     def read(self, numbers: Sequence[int], times: Sequence[int]) -> LogRows:
-        """See `LogTable`."""
         arrays = [*self._columns.values()]
         return LogRows(
             {place: _numbers(self, place, arrays[place]) for place in numbers},

@@ -57,7 +57,6 @@ class TimeEntry(Entry):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns."""
         return (self.column,) if isinstance(self.column, str) else tuple(self.column)
 
 

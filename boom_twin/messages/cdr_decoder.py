@@ -38,7 +38,6 @@ class MessageBlock:
         return MessageBlock(self.content, self.sources[rows], self.log_times[rows], self.starts[rows], self.ends[rows])
 
     def data(self, row: int) -> bytes:
-        """Return one encoded message."""
         return self.content[self.starts[row] : self.ends[row]]
 
 
@@ -245,6 +244,5 @@ def _axes(data: bytes, place: int, frame: str) -> Axes | None:
 
 
 def _axes_of(frame: str, numbers: Any) -> Axes:
-    """Return the fields of an Imu by all its numbers."""
     rate, force = (numbers[first : first + 4] for first in (_BEFORE_RATE, _BEFORE_FORCE))
     return Axes(frame, Vector(*rate[:3]), (rate[3],), Vector(*force[:3]), (force[3],))

@@ -42,7 +42,6 @@ class EncodedBlockBuilder:
             self._groups.append((key, at, np.full(len(at), turns), data))
 
     def add_one(self, key: str, at: int, turn: int, data: bytes) -> None:
-        """Add a single message."""
         self.add(key, np.array([at]), turn, np.frombuffer(data, np.uint8)[np.newaxis])
 
     def block(self, stamps: Integers) -> EncodedBlock:

@@ -175,7 +175,6 @@ def _set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Itera
 
 
 def _known_channels() -> str:
-    """Return all possible names of channels, for a message."""
     kinds = SENSORS.values()
     *most, last = [name for kind in kinds for name in (kind.channels(0) or (kind.channels(1)[0], f"{kind.channels(2)[-1]} .."))]
     return f"{', '.join(most)} and {last}"
@@ -192,7 +191,6 @@ def _fault(detail: ErrorDetails, *before: str) -> Fault:
 
 
 def _model_at(place: list[str]) -> type[BaseModel]:
-    """Return the model that has the key at `place`."""
     if "place" in place[:-1]:
         return SensorPlace
     if place[0] == "sensors" and len(place) > 1:

@@ -32,7 +32,6 @@ class SensorPlace(BaseModel):
 
     @property
     def value(self) -> Place:
-        """The place."""
         return Place(self.section, self.at, self.turned)
 
 

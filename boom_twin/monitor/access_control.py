@@ -150,29 +150,24 @@ class Connection(web.RequestHandler):
         self._deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Start waiting for a request."""
         super().connection_made(transport)
         self.address = str((transport.get_extra_info("peername") or [""])[0])
         self._deadline = asyncio.get_running_loop().call_later(REQUEST_TIME, self._all.cut_off, self, LATE)
         self._all.count(self, is_accepted=False)
 
     def connection_lost(self, exc: BaseException | None) -> None:
-        """Stop counting the closed connection."""
         self._cancel_deadline()
         self._all.end(self)
         super().connection_lost(exc)
 
     def accept(self) -> None:
-        """Count the connection as accepted."""
         self._cancel_deadline()
         self._all.count(self, is_accepted=True)
 
     def become_viewer(self) -> None:
-        """Stop counting the connection, because it is now a WebSocket."""
         self._all.end(self)
 
     def abort(self) -> None:
-        """Close the connection without an answer."""
         self._cancel_deadline()
         if self.transport is not None:
             self.transport.abort()
@@ -217,7 +212,6 @@ class LogRateLimit(logging.Filter):
         self._periods: dict[str, tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Return True if the record is to be written."""
         now = time.monotonic()
         begin, count = self._periods.get(record.name, (now, 0))
         if now - begin >= LOG_PERIOD:

@@ -57,7 +57,6 @@ class Webhook:
         self._waiting: asyncio.Queue[Mapping[str, Any]] = asyncio.Queue(MAX_WAITING)
 
     def put(self, message: Mapping[str, Any]) -> None:
-        """Queue a message."""
         if self._waiting.full():
             self._give_up(self._waiting.get_nowait(), f"more than {MAX_WAITING} messages wait")
             self._waiting.task_done()
@@ -198,11 +197,9 @@ class Metrics:
             self._samples, self._grew = self._samples + new, time.monotonic()
 
     def text(self) -> tuple[bytes, str]:
-        """Return all metrics and their content type."""
         return generate_latest(self), CONTENT_TYPE_LATEST
 
     def collect(self) -> Iterator[Any]:
-        """Yield all metrics."""
         self.follow()
         is_live, age = self._feed.end is None, time.monotonic() - self._grew
         yield self._counter("stroke_samples", "Stroke samples with a prediction, as the monitor received them.", self._samples)

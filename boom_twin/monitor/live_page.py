@@ -36,17 +36,14 @@ class SourceFeed(Feed):
         self._waiting: deque[tuple[Sample, Report]] = deque(maxlen=most_waiting)
 
     def put(self, sample: Sample, report: Report) -> None:
-        """Queue a sample and its report for the next poll."""
         self._waiting.append((sample, report))
 
     def poll(self) -> None:
-        """Show the waiting samples."""
         most_at_once = 200  # largest number of samples in one poll, so that pages are served
         for _ in range(min(len(self._waiting), most_at_once)):
             self._view.took(*self._waiting.popleft())
 
     def now(self) -> float:
-        """Return the time (s) of a monotonic clock."""
         return time.monotonic()
 
     def publish(self, words: str) -> None:

@@ -96,7 +96,6 @@ def alarms(found: list[ListedAlarm]) -> dict[str, Any]:
 
 
 def dump(message: Any) -> str:
-    """Return a message as JSON text."""
     return json_text(message, separators=(",", ":"))
 
 

@@ -37,7 +37,6 @@ class Server:
         self._viewers: set[web.WebSocketResponse] = set()
 
     def application(self) -> web.Application:
-        """Return the application for `aiohttp.web`."""
         application = web.Application(middlewares=[self._guard], client_max_size=MAX_REQUEST_BYTES)
         routes = {"/": self._index, "/socket": self._connect, "/page/{name}": self._file, "/metrics": self._answer_metrics}
         application.add_routes([web.get(path, handler) for path, handler in routes.items()])

@@ -232,7 +232,6 @@ def readings_of(session: Session, topics: Topics, joints: int, window: TimeWindo
 
 
 def _values(message: Any, stream: Stream) -> Iterator[tuple[str, Array]]:
-    """Return names and readings (k,) of a message."""
     if SENSORS[stream].is_accelerometer:
         names, values = AXES, [getattr(message.linear_acceleration, axis) for axis in AXES]
     else:

@@ -145,7 +145,6 @@ class _Shapes:
         self._newest: list[tuple[float, Array]] = []
 
     def add(self, found: list[tuple[float, Array]]) -> None:
-        """Append shapes."""
         most_shapes = 1024  # shapes of the boom that are kept, of which pictures show two dozen
         numbered = enumerate(found, self._count)
         self._chosen += [(number, shape) for number, shape in numbered if number % self._step == 0]
@@ -157,7 +156,6 @@ class _Shapes:
 
     @property
     def kept(self) -> list[tuple[float, Array]]:
-        """Shapes with their times that are kept."""
         is_last = bool(self._chosen) and self._chosen[-1][0] == self._count - 1
         return [shape for _, shape in self._chosen] + ([] if is_last else self._newest)
 
@@ -185,7 +183,6 @@ def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan, residuals: Resi
 
 
 def _estimate_trace(stretch: Stretch) -> EstimateTrace:
-    """Return the estimates beside the predictions."""
     estimates, predictions = stretch.estimates, stretch.predictions
     fed = estimates.is_fed[:, None]
     rigid = predictions.tip_position - predictions.tip_displacement

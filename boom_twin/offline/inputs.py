@@ -60,7 +60,6 @@ class ReplayInputs:
 
     @property
     def scene(self) -> Scene:
-        """Scene of the session."""
         return self.kept.scene
 
     @property

@@ -32,7 +32,6 @@ class ProgressLine:
         self._before, self._began, self._printed = done, time.monotonic(), 0.0
 
     def update(self, n: float, /) -> None:
-        """Add `n` to what was done."""
         self.done += n
         if self.is_shown and time.monotonic() - self._printed > INTERVAL:
             self.show()

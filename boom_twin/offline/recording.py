@@ -89,7 +89,6 @@ class SessionTotals:
         self.load = TipLoadFinder()  # of the load at the tip that the model does not know
 
     def add(self, stretch: Stretch) -> None:
-        """Add a stretch."""
         angles, predictions = stretch.of(Stream.ANGLES), stretch.predictions
         self.residuals.add(angles.values)
         self.normalised.add(angles.normalised)
@@ -149,7 +148,6 @@ class Recording:
         self.totals = SessionTotals(joints)  # of all stretches that are complete
 
     def add(self, rows: ReportBlock, samples: SampleBlock) -> None:
-        """Add a block of samples and their reports."""
         self._samples.append(samples)
         self._parts.append(rows)
         held = {"leap", "late", "second source"}  # such samples were left out, unless a later report gives them
@@ -187,7 +185,6 @@ class Recording:
 
     @property
     def is_empty(self) -> bool:
-        """Return True if nothing was predicted yet."""
         return self._newest is None
 
     def _complete(self) -> None:

@@ -84,7 +84,6 @@ class Replay(SummaryDisplay):
         return data_frame(self.columns())
 
     def summary_rows(self) -> dict[str, str]:
-        """See `boom_twin.system.result_text.SummaryDisplay`."""
         told = self.summary
         return {
             "session": str(self.session.path),

@@ -74,7 +74,6 @@ class CsvFile:
         self._file.write("".join(self._form % tuple(row) for row in rows.tolist()).replace("nan", ""))
 
     def close(self) -> None:
-        """Complete the table."""
         self._file.close()
 
 
@@ -87,12 +86,10 @@ class ParquetFile:
         self._writer = parquet.ParquetWriter(path, self._schema)
 
     def write(self, rows: Array) -> None:
-        """Append rows, shape (k, columns)."""
         arrays = [self._arrow.array(np.ascontiguousarray(column), from_pandas=True) for column in rows.T]
         self._writer.write_table(self._arrow.Table.from_arrays(arrays, schema=self._schema))
 
     def close(self) -> None:
-        """Complete the table."""
         self._writer.close()
 
 
@@ -156,7 +153,6 @@ class SampleTable:
         self._write(int(np.searchsorted(self._stamps, self._stamps[-1] - round(delay / NANO))))
 
     def finish(self) -> None:
-        """Write the rest."""
         self._write(len(self._stamps))
 
     def _new_rows(self, stretch: Stretch) -> Array:

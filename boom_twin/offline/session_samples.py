@@ -81,7 +81,6 @@ class SessionSamples:
 
     @property
     def oddities(self) -> Counter[str]:
-        """Oddities of the messages that were read."""
         return self._decoder.oddities
 
     def __iter__(self) -> Iterator[SampleBlock | Change | None]:

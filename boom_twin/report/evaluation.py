@@ -38,35 +38,6 @@ class Evaluation:
         return all(part.height for part in self.scene.sections if part.beam is not None)
 
 
-class Evaluator:
-    """Evaluation of a replay block by block. Its `add` is the function to give to `boom_twin.offline.replay.replay_into`.
-
-    Fatigue is computed for a detail `category` (MPa), without one not at all.
-    """
-
-    def __init__(self, scene: Scene, category: float | None = None) -> None:
-        self._scene, self._category = scene, category
-        self._history, self._quantities, self._rests = HistoryBuilder(scene), QuantityBuilder(scene), RestFinder(scene)
-        self._fatigue = None if category is None else FatigueCounter(scene, category)
-
-    def add(self, stretch: Stretch) -> None:
-        """Add the next block of the replay."""
-        own = self._history.add(stretch)
-        self._quantities.add(own, stretch.estimates.load, stretch.estimates.load_variance)
-        if self._fatigue is not None:
-            self._fatigue.add(own)
-        self._rests.add(own, stretch.estimates.load)
-
-    def finish(self, result: Replay, folder: Path) -> Evaluation:
-        """Return the evaluation of the replay and write its figures into `folder`; to be called once."""
-        rests = self._rests.finish()
-        found = self._quantities.quantities(result.recording.totals.tip_sigma, rests)
-        history, loads = self._history.history(result.recording), self._quantities.loads.most_loaded()
-        fatigue = [] if self._fatigue is None else self._fatigue.results()
-        write(folder, self._scene, found)
-        return Evaluation(result, self._scene, history, rests, loads, fatigue, self._category, found)
-
-
 def evaluated_replay(
     building: Path,
     bag: str | Path,
@@ -78,13 +49,31 @@ def evaluated_replay(
 ) -> Evaluation:
     """Replay a session into the folder `building` as `replay_into` does, with its figures; return its evaluation.
 
-    `category` is that of `Evaluator`; `also` is given each stretch too.
+    Fatigue is computed for a detail `category` (MPa), without one not at all. `also` is given each stretch too.
     """
-    evaluator = Evaluator(scene.scene, category)
+    history, quantities, rests = HistoryBuilder(scene.scene), QuantityBuilder(scene.scene), RestFinder(scene.scene)
+    fatigue = None if category is None else FatigueCounter(scene.scene, category)
 
     def take(stretch: Stretch) -> None:
-        evaluator.add(stretch)
+        own, estimates = history.add(stretch), stretch.estimates
+        quantities.add(own, estimates.load, estimates.load_variance)
+        rests.add(own, estimates.load)
+        if fatigue is not None:
+            fatigue.add(own)
         if also is not None:
             also(stretch)
 
-    return evaluator.finish(replay_into(building, bag, scene, settings, options, take), building)
+    result = replay_into(building, bag, scene, settings, options, take)
+    measured = rests.finish()
+    found = quantities.quantities(result.recording.totals.tip_sigma, measured)
+    write(building, scene.scene, found)
+    return Evaluation(
+        result,
+        scene.scene,
+        history.history(result.recording),
+        measured,
+        quantities.loads.most_loaded(),
+        [] if fatigue is None else fatigue.results(),
+        category,
+        found,
+    )

@@ -125,12 +125,10 @@ class FatigueCounter:
         self._counters = [RainflowCounter() for _ in self._stations]
 
     def add(self, history: History) -> None:
-        """Add the next block, with all its rows."""
         for counter, stress in zip(self._counters, (history.moments / self._moduli).T, strict=True):
             counter.add(stress)
 
     def results(self) -> list[Fatigue]:
-        """Return the fatigue of every station, base to tip."""
         rows = []
         for station, counter in zip(self._stations, self._counters, strict=True):
             cycles = counter.cycles()

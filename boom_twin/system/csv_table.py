@@ -37,7 +37,6 @@ class CsvTable:
     is_ended: bool = True  # False if the last row is the last of the file, and has no line end
 
     def column(self, name: str) -> list[float]:
-        """Return the numbers of a column."""
         place = self.names.index(name)
         return [self._number(row, place, line) for row, line in zip(self.rows, self.lines, strict=True)]
 

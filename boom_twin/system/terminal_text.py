@@ -39,7 +39,6 @@ class PrintableStream:
         self._do(lambda: self._stream.write(printable(text, keep="\n\t\r")))
 
     def flush(self) -> None:
-        """Flush the stream."""
         self._do(self._stream.flush)
 
     def _do(self, act: Callable[[], object]) -> None:
@@ -52,7 +51,6 @@ class PrintableStream:
                 raise OSError(error.errno, error.strerror, self._name) from None
 
     def writelines(self, lines: Iterable[str]) -> None:
-        """Write all lines."""
         for line in lines:
             self.write(line)
 

@@ -80,7 +80,6 @@ class Checked(NamedTuple):
 
     @property
     def wrong_angles(self) -> list[str]:
-        """Return the angle channels that are not read as declared."""
         return [each.channel for each in self.verdicts if each.is_wrong and each.stream is Stream.ANGLES]
 
     @property
@@ -294,7 +293,6 @@ STROKES_ALONE = "strokes are within the travels; swapped or shifted ones show on
 
 
 def reading(way: Channel) -> str:
-    """Return how a channel is read."""
     parts = [way.name, way.unit]
     parts += ["sign -1"] if way.sign < 0 else []
     parts += [f"zero {way.zero:.6g}"] if way.zero else []

@@ -83,7 +83,6 @@ def read_alike(cube: Cube, j: int, channel: Channel) -> tuple[NDArray[np.int64],
 
 
 def without(costs: Array, places: tuple[NDArray[np.int64], ...]) -> Array:
-    """Return costs without some hypotheses."""
     found = costs.copy()
     found[places] = IMPOSSIBLE
     return found
@@ -179,7 +178,6 @@ def _force_error(expected: Expected, j: int) -> Array:
 
 
 def angle_cube(table: Table, declared: Sequence[Channel], expected: Expected, weight: float) -> Cube:
-    """Return the costs of angle readings."""
     units = SENSORS[Stream.ANGLES].units
     found = _Builder(len(declared), len(table.names), units)
     for a, name in enumerate(table.names):
@@ -219,7 +217,6 @@ def _zeros(off: Array, is_encoder: bool, weight: float) -> Iterator[tuple[float,
 
 
 def force_cube(table: Table, declared: Sequence[Channel], expected: Expected, weight: float) -> Cube:
-    """Return the costs of force readings."""
     units = SENSORS[Stream.FORCES].units
     found = _Builder(len(declared), len(table.names), units)
     for a, name in enumerate(table.names):

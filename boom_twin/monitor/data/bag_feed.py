@@ -62,7 +62,6 @@ class BagFeed(Feed):
         self._steps, self.end = None, self.store.newest
 
     def close(self) -> None:
-        """Stop reading."""
         if self._steps is not None:
             self._steps.close()
 

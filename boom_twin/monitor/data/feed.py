@@ -93,11 +93,9 @@ class Playback:
 
     @property
     def is_at_end(self) -> bool:
-        """Return True if the position is at the end of the session."""
         return self.position >= (self._feed.end or 0.0)
 
     def pace(self, speed: float) -> None:
-        """Set the speed, limited to the permitted range."""
         slowest_playback, fastest_playback = 0.1, 10.0
         self.speed = min(max(speed, slowest_playback), fastest_playback)
 
