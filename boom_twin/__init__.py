@@ -54,28 +54,10 @@ _NAMES = {
 _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 __all__ = [
-    "BagError",
-    "BoomTwinError",
-    "LivePage",
-    "Report",
-    "Sample",
-    "Scene",
-    "SceneError",
-    "SceneWarning",
-    "SessionWriter",
-    "Settings",
-    "SolverError",
-    "Stream",
-    "TimeWindow",
-    "Twin",
-    "UsageError",
-    "frequency_response",
-    "load_scene",
-    "load_settings",
-    "replay",
-    "simulate",
-    "statics",
-]
+    "BagError", "BoomTwinError", "LivePage", "Report", "Sample", "Scene", "SceneError", "SceneWarning", "SessionWriter",
+    "Settings", "SolverError", "Stream", "TimeWindow", "Twin", "UsageError", "frequency_response", "load_scene",
+    "load_settings", "replay", "simulate", "statics",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from recordings import SessionSheet
+from recordings import SessionMetadata
 
 from boom_twin import Twin, __version__
 from boom_twin.types import Array, StrokeReading
@@ -26,7 +26,7 @@ def drive_twin(*arguments: Any, **options: Any) -> Twin:
 
 def note_drives(folder: Path) -> None:
     """Write the ``session.yaml`` of a session whose strokes are drives."""
-    SessionSheet(__version__, strokes=StrokeReading.DRIVE).write(folder)
+    SessionMetadata(__version__, strokes=StrokeReading.DRIVE).write(folder)
 
 
 def drive_readings(session: RigSession) -> Array:

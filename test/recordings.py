@@ -10,8 +10,8 @@ from boom_twin.bag.metadata import FILE_NAME as METADATA
 from boom_twin.bag.metadata import read_metadata, write_metadata
 from boom_twin.bag.reader import Session, read, read_both, scan
 from boom_twin.bag.recover import Recovery, recover
-from boom_twin.bag.session_model import FILE_NAME as SHEET
-from boom_twin.bag.session_model import SessionSheet, incompleteness, kept, mapping_of, scene_of
+from boom_twin.bag.session_model import FILE_NAME as SESSION_YAML
+from boom_twin.bag.session_model import SessionMetadata, incompleteness, kept, mapping_of, scene_of
 from boom_twin.bag.session_writer import samples_in_rows, sensor_message, write_samples
 from boom_twin.bag.writer import FILE_NAME, MessageWriter
 from boom_twin.messages.mapping import load_mapping
@@ -20,9 +20,9 @@ from boom_twin.offline.ground_truth import load_truth
 from boom_twin.types import Array
 
 __all__ = [
-    "FILE_NAME", "METADATA", "SHEET", "TRUTH", "MessageWriter", "Recovery", "Session", "SessionSheet", "incompleteness",
-    "kept", "load_mapping", "load_truth", "mapping_of", "read", "read_both", "read_metadata", "recover", "samples_in_rows",
-    "scan", "scene_of", "sensor_message", "write_metadata", "write_samples", "write_session",
+    "FILE_NAME", "METADATA", "SESSION_YAML", "TRUTH", "MessageWriter", "Recovery", "Session", "SessionMetadata",
+    "incompleteness", "kept", "load_mapping", "load_truth", "mapping_of", "read", "read_both", "read_metadata", "recover",
+    "samples_in_rows", "scan", "scene_of", "sensor_message", "write_metadata", "write_samples", "write_session",
 ]  # fmt: skip
 
 

@@ -22,7 +22,7 @@ def samples_in(session: Path, streams: Iterable[Stream] = USUAL, seconds: float 
     for name, _, msg in read(scan(session), {name: inputs[stream].type for name, stream in names.items()}):
         if found and stamp_of(msg) - found[0].stamp > 1e9 * seconds:
             break
-        sample = decoder.put(names[name], stamp_of(msg), msg)
+        sample = decoder.sample_of(names[name], stamp_of(msg), msg)
         assert sample is not None
         found.append(sample)
     return found

@@ -32,7 +32,7 @@ class CsvFile(SessionFile):
     readings: list[Readings]
     joints: int
 
-    def heads(self) -> Iterator[tuple[int, int, bytes]]:
+    def messages(self) -> Iterator[tuple[int, int, bytes]]:
         numbers = {channel.topic: channel.id for channel in self.channels.values()}
         for block in encoded_blocks(self.readings, load_topics(), self.joints):
             found = [(place, numbers[rows.key], data) for rows in block.rows for place, data in zip(*rows[1:], strict=True)]

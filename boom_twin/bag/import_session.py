@@ -26,7 +26,7 @@ from ..messages.mapping import load_mapping, mapping_from
 from ..messages.topic_table import Topics
 from ..types import NANO, SECOND, SENSORS, Array, Sample, Stream, channels_of, sensor_kind, stream_of
 from .metadata import dump
-from .session_model import SessionSheet
+from .session_model import SessionMetadata
 from .session_writer import LogTimes, named_message
 from .writer import MessageWriter
 
@@ -79,7 +79,7 @@ def import_session(
     tables: Sequence[LogTable],
     out: Path,
     given: ColumnFile,
-    sheet: SessionSheet,
+    metadata: SessionMetadata,
     joints: int | None = None,
     mapping: Path | None = None,
 ) -> ImportedSession:
@@ -113,7 +113,7 @@ def import_session(
     readings = readings_of(assignment, read, topics, joints)
     origin = f"imported from {', '.join(dict.fromkeys(Path(table.source).name for table in tables))}"
     counts = _write(out, readings, topics, joints, origin)
-    replace(sheet, mapping=text or None, origin=origin).write(out)
+    replace(metadata, mapping=text or None, origin=origin).write(out)
     return ImportedSession(assignment, read, counts)
 
 

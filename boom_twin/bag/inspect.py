@@ -142,7 +142,7 @@ def _count(file: SessionFile, tallies: dict[str, Tally], bounds: tuple[int, int]
             own[key].stamped = schema is not None and has_header(schema)
     seen: Counter[int] = Counter()
     with as_bag_error(file.path):
-        for key, log_time, data in file.heads():
+        for key, log_time, data in file.messages():
             seen[key] += 1
             if bounds[0] <= log_time < bounds[1] and key not in passed_over:
                 own[key].add(log_time, data)

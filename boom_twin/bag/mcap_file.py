@@ -58,7 +58,7 @@ class McapFile(SessionFile):
     # chunks, and runs of messages outside chunks, in the order of the file
     pieces: list[ChunkIndex] = field(default_factory=list)
 
-    def heads(self) -> Iterator[tuple[int, int, bytes]]:
+    def messages(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield messages as in `SessionFile`, in the order of the file, with one piece in memory."""
         with open_received(self.path) as file:
             for piece in self.pieces:

@@ -12,22 +12,9 @@ from collections.abc import Mapping
 from typing import BinaryIO
 
 import numpy as np
+from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import (
-    Channel,
-    Chunk,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    McapRecord,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
 from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdCompressor
 
@@ -51,23 +38,23 @@ class McapWriter:
     def __init__(self, stream: BinaryIO, profile: str, library: str, chunk_size: int) -> None:
         self._stream, self._chunk_size = stream, chunk_size
         self._chunk = _OpenChunk()
-        self._schemas: list[Schema] = []
-        self._channels: list[Channel] = []
+        self._schemas: list[records.Schema] = []
+        self._channels: list[records.Channel] = []
         self._chunks = bytearray()  # encoded chunk index, long for a day
         self._chunk_count, self._span = 0, (2**64, 0)  # of all chunks: first and last log time, ns
-        self._metadata: list[MetadataIndex] = []
+        self._metadata: list[records.MetadataIndex] = []
         self._counts: Counter[int] = Counter()
-        stream.write(MCAP0_MAGIC + _encoded(Header(profile, library)))
+        stream.write(MCAP0_MAGIC + _encoded(records.Header(profile, library)))
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write a metadata record at once, ahead of messages in the open chunk."""
-        record, start = _encoded(Metadata(name, dict(values))), self._stream.tell()
+        record, start = _encoded(records.Metadata(name, dict(values))), self._stream.tell()
         self._stream.write(record)
-        self._metadata.append(MetadataIndex(start, len(record), name))
+        self._metadata.append(records.MetadataIndex(start, len(record), name))
 
     def register_schema(self, name: str, encoding: str, definition: bytes) -> int:
         """Add a message type and return its number."""
-        self._schemas.append(Schema(id=len(self._schemas) + 1, data=definition, encoding=encoding, name=name))
+        self._schemas.append(records.Schema(id=len(self._schemas) + 1, data=definition, encoding=encoding, name=name))
         self._chunk.content += _encoded(self._schemas[-1])
         self._finish_full_chunk()
         return len(self._schemas)
@@ -75,7 +62,7 @@ class McapWriter:
     def register_channel(self, topic: str, encoding: str, schema: int, details: Mapping[str, str]) -> int:
         """Add a topic with the message type of number `schema` and return its channel number."""
         number = len(self._channels) + 1
-        self._channels.append(Channel(number, topic, encoding, dict(details), schema))
+        self._channels.append(records.Channel(number, topic, encoding, dict(details), schema))
         self._chunk.content += _encoded(self._channels[-1])
         self._finish_full_chunk()
         return number
@@ -97,12 +84,12 @@ class McapWriter:
         _scatter(_heads(channels, sequences, block.log_times, lengths), content, starts)
         for rows in block.rows:
             _scatter(rows.data, content, starts[rows.places] + _HEADS.itemsize)
-        records, first, begin = content.data, 0, 0
+        encoded, first, begin = content.data, 0, 0
         while first < len(ends):
             room = self._chunk_size - len(self._chunk.content)
             part = slice(first, int(np.searchsorted(ends, begin + room, side="right")) + 1)
             end = int(ends[part][-1])
-            self._chunk.add_block(channels[part], block.log_times[part], starts[part] - begin, records[begin:end])
+            self._chunk.add_block(channels[part], block.log_times[part], starts[part] - begin, encoded[begin:end])
             self._finish_full_chunk()
             first, begin = part.stop, end
 
@@ -114,7 +101,7 @@ class McapWriter:
     def finish(self) -> None:
         """Write the end of the file: summary, offsets of its parts, footer."""
         self._finish_chunk()
-        self._stream.write(_encoded(DataEnd(0)))
+        self._stream.write(_encoded(records.DataEnd(0)))
         place = start = self._stream.tell()
         checksum, offsets = 0, []
         groups = (
@@ -126,15 +113,15 @@ class McapWriter:
             (Opcode.METADATA_INDEX, _encoded(*self._metadata)),
         )
         for opcode, group in groups:
-            offsets.append(SummaryOffset(opcode, place, len(group)))
+            offsets.append(records.SummaryOffset(opcode, place, len(group)))
             checksum, place = zlib.crc32(group, checksum), place + len(group)
             self._stream.write(group)
-        footer, last = Footer(start, place, 0), _encoded(*offsets)
+        footer, last = records.Footer(start, place, 0), _encoded(*offsets)
         footer.summary_crc = zlib.crc32(_encoded(footer)[:-4], zlib.crc32(last, checksum))  # covers all but itself
         self._stream.write(last + _encoded(footer) + MCAP0_MAGIC)
 
-    def _statistics(self) -> Statistics:
-        return Statistics(
+    def _statistics(self) -> records.Statistics:
+        return records.Statistics(
             attachment_count=0,
             channel_count=len(self._channels),
             channel_message_counts=self._counts,
@@ -158,7 +145,7 @@ class McapWriter:
         packed, start = ZstdCompressor().compress(chunk.content), self._stream.tell()
         written = bytearray(
             _encoded(
-                Chunk(
+                records.Chunk(
                     compression=COMPRESSION,
                     data=packed,
                     message_start_time=chunk.start,
@@ -178,7 +165,7 @@ class McapWriter:
         self._chunk_count += 1
         self._span = min(self._span[0], chunk.start), max(self._span[1], chunk.end)
         self._chunks += _encoded(
-            ChunkIndex(
+            records.ChunkIndex(
                 message_start_time=chunk.start,
                 message_end_time=chunk.end,
                 chunk_start_offset=start,
@@ -211,14 +198,14 @@ class _OpenChunk:
         self.entries.setdefault(channel, bytearray()).extend(_INDEX_ENTRY.pack(log_time, len(self.content)))
         self.content += record
 
-    def add_block(self, channels: Integers, log_times: Integers, places: Integers, records: memoryview) -> None:
-        """Append one or more messages whose records begin at `places` in `records`."""
+    def add_block(self, channels: Integers, log_times: Integers, places: Integers, encoded: memoryview) -> None:
+        """Append one or more messages whose records begin at `places` in `encoded`."""
         self._extend_span(int(log_times.min()), int(log_times.max()))
         entries = np.column_stack([log_times, places + len(self.content)]).astype("<u8")
         kinds, firsts = np.unique(channels, return_index=True)
         for channel in kinds[np.argsort(firsts)].tolist():
             self.entries.setdefault(channel, bytearray()).extend(entries[channels == channel].tobytes())
-        self.content += records
+        self.content += encoded
 
     def _extend_span(self, start: int, end: int) -> None:
         self.start = min(self.start, start) if self.entries else start
@@ -241,8 +228,8 @@ def _scatter(rows: Bytes, target: Bytes, starts: Integers) -> None:
     places[starts] = rows.view(kind)[:, 0]
 
 
-def _encoded(*records: McapRecord) -> bytes:
+def _encoded(*group: records.McapRecord) -> bytes:
     builder = RecordBuilder()
-    for record in records:
+    for record in group:
         record.write(builder)
     return bytes(builder.end())  # type: ignore[no-untyped-call]

@@ -46,15 +46,15 @@ class SqliteFile(SessionFile):
             pieces = (np.array(piece).T for piece in iter(lambda: rows.fetchmany(_TOGETHER), []))
             return LogClock.of(((channels, times.astype(np.uint64)) for channels, times in pieces), self.counts)
 
-    def heads_by(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
+    def messages_by(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
         """Yield messages as in `SessionFile`: as they were stored, if the clock was set back."""
         newest = 0
-        for row, (channel, time, data) in enumerate(self.heads("id" if clock.places else "timestamp, id")):
+        for row, (channel, time, data) in enumerate(self.messages("id" if clock.places else "timestamp, id")):
             place = PIECE * (row // _TOGETHER) + row % _TOGETHER
             newest = max(newest, time + clock.shifts[bisect_right(clock.places, place)])
             yield channel, newest, data
 
-    def heads(self, order: str = "timestamp, id") -> Iterator[tuple[int, int, bytes]]:
+    def messages(self, order: str = "timestamp, id") -> Iterator[tuple[int, int, bytes]]:
         """Yield messages as in `SessionFile`, in the order of their log times.
 
         Raise BagError if the messages have more bytes than the file: columns with a default, or generated, can give any
@@ -145,7 +145,7 @@ _MEND = "The file is damaged or was cut off: `rosbag reindex` or `rosbag fix` of
 class Ros1File(SessionFile):
     """Content of one .bag file, which has no checksums."""
 
-    def heads(self) -> Iterator[tuple[int, int, bytes]]:
+    def messages(self) -> Iterator[tuple[int, int, bytes]]:
         convert = jazzy().ros1_to_cdr
         with _reader(self.path) as reader:
             for connection, time, data in reader.messages():

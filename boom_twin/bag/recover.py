@@ -22,7 +22,7 @@ from .metadata import BagMetadata, Recorded, offered_qos, profiles
 from .reader import RECOVERED, SUMMARISE, scan, sources
 from .scanner import DamagedBytes, SoundRecords, scan_damaged
 from .session_file import as_bag_error, by_topic
-from .session_model import sheet_path
+from .session_model import session_yaml
 from .writer import BagWriter
 
 
@@ -162,7 +162,7 @@ def _recover(path: Path, out: Path) -> Recovery:
         raise
     if not bag.counts.total():
         raise BagError(f"{path}: nothing can be saved: {_first(outcome)}.")
-    _copy_sheet(path, out)
+    _copy_session_yaml(path, out)
     outcome.saved = Counter({topic.name: topic.count for topic in scan(out).topics})
     outcome.lost = _lost(outcome.saved, all_definitions, metadata, files)
     return outcome
@@ -200,12 +200,12 @@ def _copy(
                 outcome.unvouched[bag.topics[key].topic] += 1
 
 
-def _copy_sheet(path: Path, out: Path) -> None:
+def _copy_session_yaml(path: Path, out: Path) -> None:
     """Copy ``session.yaml``, whose scene and mapping a replay needs."""
-    sheet = sheet_path(path)
-    if holds_file(sheet) and sheet.stat().st_size <= LARGEST_FILE:
-        with open_received(sheet) as file:
-            write_atomic(out / sheet.name, file.read(LARGEST_FILE))
+    source = session_yaml(path)
+    if holds_file(source) and source.stat().st_size <= LARGEST_FILE:
+        with open_received(source) as file:
+            write_atomic(out / source.name, file.read(LARGEST_FILE))
 
 
 def _lost(

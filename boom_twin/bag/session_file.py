@@ -187,7 +187,7 @@ class SessionFile(ABC):
         return "/".join([parts[0], "msg", parts[1]] if len(parts) == 2 else parts)
 
     @abstractmethod
-    def heads(self) -> Iterator[tuple[int, int, bytes]]:
+    def messages(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield channel, log time (ns) and encoded data of all messages."""
 
     @cached_property
@@ -195,9 +195,9 @@ class SessionFile(ABC):
         """Clock of log times. The default is for a storage whose order is that of log times."""
         return LogClock([], [0])
 
-    def heads_by(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
-        """Yield messages as `heads` does, in the order of log times by the `clock`."""
-        return self.heads()
+    def messages_by(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
+        """Yield messages as `messages` does, in the order of log times by the `clock`."""
+        return self.messages()
 
     def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
         """Yield blocks of all messages, except of the `passed` channels, in the order of log times by the `clock`.
@@ -205,7 +205,7 @@ class SessionFile(ABC):
         `sources` of a block holds channel numbers.
         """
         together = 2000  # messages in one block of a file that is read message by message
-        found = (each for each in self.heads_by(clock) if each[0] not in passed)
+        found = (each for each in self.messages_by(clock) if each[0] not in passed)
         while group := list(islice(found, together)):
             sources, times, data = zip(*group, strict=True)
             ends = np.cumsum([len(each) for each in data])

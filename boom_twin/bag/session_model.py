@@ -36,7 +36,7 @@ _HEAD = "# What this session was made with. scene_sha256 is of the text under sc
 
 
 @dataclass(frozen=True, slots=True)
-class SessionSheet:
+class SessionMetadata:
     """Metadata of a session: version, scene, settings and mapping. A field that is None or empty is left out of the file."""
 
     version: str
@@ -89,7 +89,7 @@ class KeptText:
     source: str
 
 
-def sheet_path(session: Path) -> Path:
+def session_yaml(session: Path) -> Path:
     """Return the path of the ``session.yaml`` of a session: in its directory, or beside its single file."""
     return (session if session.is_dir() else session.parent) / FILE_NAME
 
@@ -100,7 +100,7 @@ def kept(session: Path, key: str, option: str) -> KeptText | None:
     `key` is one of ``session.yaml``: scene, parameters, mapping, .. The error names the `option` by which a user gives another
     text. Raise BagError if ``session.yaml`` cannot be read, or holds something else there.
     """
-    path, remedy = sheet_path(session), f"Move it away, or give the {key} by {option}."
+    path, remedy = session_yaml(session), f"Move it away, or give the {key} by {option}."
     text = _value(path, key, remedy)
     if not isinstance(text, str | None):
         raise BagError(f"{path}, {key}: not a text, as `boom_twin record` writes it. {remedy}")
@@ -110,9 +110,9 @@ def kept(session: Path, key: str, option: str) -> KeptText | None:
 def missed_messages(session: Path) -> dict[str, int]:
     """Return the number of messages that never reached the recorder, by topic, as counted at its end; only those above 0."""
     try:
-        counts = _value(sheet_path(session), "counts", "")
+        counts = _value(session_yaml(session), "counts", "")
     except BagError:
-        return {}  # whoever needs the sheet's scene or mapping is told
+        return {}  # whoever needs its scene or mapping is told
     rows = [row for row in counts if isinstance(row, dict)] if isinstance(counts, list | tuple) else []
     found = {str(row.get("topic")): row.get("missed") for row in rows}
     return {topic: missed for topic, missed in found.items() if isinstance(missed, int) and missed > 0}
@@ -133,7 +133,7 @@ def kept_origin(session: Path) -> dict[str, str]:
     try:
         found = kept(session, "origin", "--scene")
     except BagError:
-        return {}  # a note is not worth a refusal: whoever needs the sheet's scene or mapping is told
+        return {}  # a note is not worth a refusal: whoever needs its scene or mapping is told
     return {"origin": found.text} if found else {}
 
 
@@ -173,12 +173,12 @@ def incompleteness(path: Path) -> str:
     for place in (folder, *folder.resolve().parents[:2]):
         if is_unfinished(place):
             return f"incomplete: {place / UNFINISHED} says that its command was stopped, or is still at work. Run it again."
-    sheet = folder / FILE_NAME
-    if sheet.is_file():
-        with sheet.open("rb") as stream:
+    file = folder / FILE_NAME
+    if file.is_file():
+        with file.open("rb") as stream:
             text = stream.read(LARGEST_FILE)
         if _BEGUN.search(text) and not _ENDED.search(text):
-            return f"incomplete: the recorder was ended by force, or is still at work: {sheet} tells no end."
+            return f"incomplete: the recorder was ended by force, or is still at work: {file} tells no end."
     return ""
 
 
@@ -279,7 +279,7 @@ def settings_of(session: Path, given: Path | None = None, namespace: str = "") -
     """
     if given is not None:
         return SessionSettings(load_settings(given, namespace), str(given))
-    path, remedy = sheet_path(session), "Move it away, or give the parameters by --params."
+    path, remedy = session_yaml(session), "Move it away, or give the parameters by --params."
     values, source = _value(path, "twin", remedy), f"{path}, twin"
     if not isinstance(values, dict | None):
         raise BagError(f"{source}: not a block of names and values, as `boom_twin record` writes it. {remedy}")
@@ -332,7 +332,7 @@ def strokes_of(session: Path | None, mapped: Mapped) -> SessionStrokes:
         except ValueError:
             bound = f"it must be {' or '.join(StrokeReading)}"
             raise BagError(f"{own.source}: {own.text[:60]!r}: {bound}. Give reads in a mapping by --mapping.") from None
-    path = None if session is None else sheet_path(session)
+    path = None if session is None else session_yaml(session)
     version = str(_value(path, "boom_twin", "")) if path and _value(path, "origin", "") == RIG_ORIGIN else ""
     made = re.match(r"(\d{1,9})\.(\d{1,9})", version)
     if made and (int(made[1]), int(made[2])) < lengths_since:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..errors import BagError, UsageError
+from ..errors import UsageError
 from ..messages.mapping import load_mapping
 from ..messages.sample_decoder import LATEST, NO_MEASUREMENT
 from ..messages.topic_table import FRAME, Topics, every_input, factor, usual
@@ -24,7 +24,7 @@ from ..scene.load import SceneSource
 from ..twin.sample_check import SampleCheck, samples_of
 from ..types import SECOND, SENSORS, Array, Sample, Stream
 from .async_writer import FileSplit, Storage
-from .session_model import SessionSheet, scene_from
+from .session_model import SessionMetadata, scene_from
 from .writer import BagWriter, MessageWriter, recorded
 
 
@@ -167,11 +167,11 @@ class SessionWriter:
         self._topics = load_mapping(path, self._joints)
         text = None if path is None else path.read_text(encoding="utf-8-sig")
         names = {topic.absolute: topic.type for topic in self._topics.inputs.values()}
-        self._sheet = SessionSheet(
+        self._metadata = SessionMetadata(
             __version__, kept.text, mapping=text, topics=names, note=note, origin=origin, started=datetime.now(UTC)
         )
         self._bag = BagWriter(self._out, {"origin": origin} if origin else None)
-        self._sheet.write(self._out)
+        self._metadata.write(self._out)
         self._storage = Storage(self._bag, FileSplit(), lambda _: None)
         self._keys: dict[str, int] = {}
         self._sensors = {stream: _Sensors(self._topics, stream, self._joints) for stream in Stream}
@@ -216,10 +216,7 @@ class SessionWriter:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         written, self._is_closed = self._storage.close(), True
         if kind is None:
-            counts = {topic: written[key] for topic, key in self._keys.items()}
-            if counts != dict(self._counts):
-                raise BagError(f"{self._out}: {counts} messages of {dict(self._counts)} were written. Report this fault.")
-            self._sheet.write(self._out, [{"topic": topic, "written": count} for topic, count in counts.items()])
+            self._metadata.write(self._out, [{"topic": topic, "written": written[key]} for topic, key in self._keys.items()])
 
 
 class _Sensors:

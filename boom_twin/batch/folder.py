@@ -15,7 +15,7 @@ from typing import Any
 
 from .. import __version__
 from ..bag.reader import is_session
-from ..bag.session_model import sheet_path
+from ..bag.session_model import session_yaml
 from ..errors import BagError, UsageError
 from ..system.atomic_files import DRAFT, write_atomic
 from ..system.received_files import real_path
@@ -85,7 +85,7 @@ def key_of(session: Path) -> str:
 
 def fingerprint(session: Path, options: str) -> str:
     """Return a digest of the names, sizes and times of change of a session's files and of the options of the batch."""
-    files = sorted(session.iterdir()) if session.is_dir() else [session, sheet_path(session)]
+    files = sorted(session.iterdir()) if session.is_dir() else [session, session_yaml(session)]
     told = [options]
     for file in files:
         if file.is_file():

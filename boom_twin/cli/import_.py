@@ -34,7 +34,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     from ..bag.import_session import import_session
-    from ..bag.session_model import SessionSheet, scene_from
+    from ..bag.session_model import SessionMetadata, scene_from
     from ..loggers.assignment import ColumnFile, assign, columns_of_options, load_columns
     from ..loggers.log_table import tables_of
     from ..system.result_folder import IMPORT, result_folder
@@ -53,9 +53,9 @@ def run(args: Namespace) -> int:
         found = assign(tables, given, joints)
         print("\n".join(proposal(found, given.timezone)))
         return 0
-    sheet = SessionSheet(__version__, None if scene is None else scene.text, note=args.note)
+    metadata = SessionMetadata(__version__, None if scene is None else scene.text, note=args.note)
     with result_folder(args.out, IMPORT, [*args.files, *files_of(args, "scene", "columns", "mapping")]) as building:
-        done = import_session(tables, building, given, sheet, joints, args.mapping)
+        done = import_session(tables, building, given, metadata, joints, args.mapping)
     _warn(done, scene is None, given.timezone)
     if scene is not None:
         tell(f"next: boom_twin info {args.out}; its line `wiring` says if units, signs and names fit the boom")

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..bag.session_model import SessionSheet
+from ..bag.session_model import SessionMetadata
 from ..config.settings import DEFAULT_FILE as DEFAULT_PARAMETERS
 from ..config.settings import load_settings, load_thresholds
 from ..config.yaml_text import with_values
@@ -67,7 +67,7 @@ def run(args: Namespace) -> int:
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))
     known = load_mapping(args.mapping)
-    wanted, sheet = _wanted(args, known), _sheet(args)
+    wanted, metadata = _wanted(args, known), _metadata(args)
     given = {"origin": args.origin, "note": args.note, "rig": args.rig}
     check_lasting(args.out)
     if args.out.is_dir() and (reason := incompleteness(args.out)):
@@ -76,17 +76,17 @@ def run(args: Namespace) -> int:
         load_settings(args.params, node.get_namespace())  # raises if they cannot be used
         thresholds = load_thresholds(args.params or DEFAULT_PARAMETERS, node.get_namespace())
         wanted = [resolved(each, node) for each in wanted]
-        sheet = replace(sheet, mapping=resolved_mapping(sheet.mapping or "", known, node))
-        sheet = replace(sheet, topics={each.name: each.type for each in wanted})
+        metadata = replace(metadata, mapping=resolved_mapping(metadata.mapping or "", known, node))
+        metadata = replace(metadata, topics={each.name: each.type for each in wanted})
         bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
-        sheet.write(args.out)
+        metadata.write(args.out)
 
         def on_twin(answers: Mapping[str, Any]) -> None:
-            nonlocal sheet
-            more = _with_twin_values(sheet, answers, known.frame, str(args.mapping or ""))
+            nonlocal metadata
+            more = _with_twin_values(metadata, answers, known.frame, str(args.mapping or ""))
             try:
                 more.write(args.out)
-                sheet = more
+                metadata = more
             except BagError as error:
                 warn(f"what the running twin told is not kept: {error}")
 
@@ -95,8 +95,8 @@ def run(args: Namespace) -> int:
         recorder = Recorder(node, storage, wanted, thresholds, tell)
         counts = recorder.run(lambda: bool(signals) or time.monotonic() >= end, on_twin)
     _tell_counts(counts)
-    sheet.write(args.out, [asdict(count) for count in counts])
-    if sheet.scene is None:
+    metadata.write(args.out, [asdict(count) for count in counts])
+    if metadata.scene is None:
         tell("no scene is kept in session.yaml: none was given by --scene, and no twin told its own")
     if not any(count.received for count in counts):
         remedy = "Check that the publishers run, as the same user, and ROS_DOMAIN_ID. Record into another --out."
@@ -104,14 +104,14 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _sheet(args: Namespace) -> SessionSheet:
+def _metadata(args: Namespace) -> SessionMetadata:
     """Return the session metadata known before recording starts. The files that are given must be valid."""
     from ..bag.session_model import scene_from
 
     scene = None if args.scene is None else scene_from(args.scene)
     if scene is not None:
         tell_oddities(scene.oddities, scene.source)
-    return SessionSheet(
+    return SessionMetadata(
         __version__,
         scene=None if scene is None else scene.text,
         parameters=(args.params or DEFAULT_PARAMETERS).read_text(encoding="utf-8"),
@@ -122,14 +122,14 @@ def _sheet(args: Namespace) -> SessionSheet:
     )
 
 
-def _with_twin_values(sheet: SessionSheet, answers: Mapping[str, Any], frame: str, given_mapping: str) -> SessionSheet:
+def _with_twin_values(metadata: SessionMetadata, answers: Mapping[str, Any], frame: str, given_mapping: str) -> SessionMetadata:
     """Return the session metadata with what the running twin reports. Given texts stay, and a difference is reported.
 
     The prefix that the twin puts before the `frame` of the mapping becomes part of the mapping, so that a replay has it too.
     """
     changes: dict[str, Any] = {"twin": answers["parameters"]} if "parameters" in answers else {}
     if prefix := answers.get("parameters", {}).get("frame_prefix"):
-        changes["mapping"] = with_values(sheet.mapping or "", [(("frame",), prefix + frame)])
+        changes["mapping"] = with_values(metadata.mapping or "", [(("frame",), prefix + frame)])
     own_mapping = answers.get("parameters", {}).get("mapping")
     if own_mapping and (not given_mapping or Path(own_mapping).resolve() != Path(given_mapping).resolve()):
         warn(
@@ -137,11 +137,11 @@ def _with_twin_values(sheet: SessionSheet, answers: Mapping[str, Any], frame: st
             f"{given_mapping or 'the default one'}: a replay would differ. Record with --mapping {own_mapping}"
         )
     own = answers.get("scene")
-    if own is not None and sheet.scene is None:
+    if own is not None and metadata.scene is None:
         changes["scene"] = own
-    elif own not in (None, sheet.scene):
+    elif own not in (None, metadata.scene):
         warn("the running twin has another scene than --scene gives; session.yaml holds the one given")
-    return replace(sheet, **changes)
+    return replace(metadata, **changes)
 
 
 def _tell_counts(counts: list[TopicCount]) -> None:

@@ -108,7 +108,7 @@ def _cylinders(text: str | None, scene: Scene) -> list[tuple[float, float]]:
 
 
 def run(args: Namespace) -> int:
-    from ..bag.session_model import RIG_ORIGIN, SessionSheet, scene_from
+    from ..bag.session_model import RIG_ORIGIN, SessionMetadata, scene_from
     from ..bag.session_writer import samples_in_rows, write_samples
     from ..offline.ground_truth import FILE_NAME
     from ..system.result_folder import RIG, result_folder
@@ -163,8 +163,8 @@ def run(args: Namespace) -> int:
         write_samples(building, samples_in_rows(session.stamps, there, session.angle_stamps), there, notes)
         # not the boom that was simulated: what a twin is to assume
         own = _mapping_text(places, cylinders)
-        sheet = SessionSheet(__version__, assumed.text, mapping=own, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)
-        sheet.write(building)
+        metadata = SessionMetadata(__version__, assumed.text, mapping=own, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)
+        metadata.write(building)
         session.save_truth(building / FILE_NAME)
     print(out)
     return 0

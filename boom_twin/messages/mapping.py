@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from difflib import get_close_matches
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from ..config.settings import nearest
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError, listed
 from ..types import NUMBERED_SIDE, SENSORS, Stream, sensor_kind, stream_of
@@ -101,8 +101,8 @@ def _role_faults(values: dict[str, Any], usual_values: dict[str, Any]) -> list[F
         if not isinstance(values[side], dict):
             continue
         for role in [role for role in values[side] if role not in usual_values[side]]:
-            near = get_close_matches(str(role), usual_values[side], n=1, cutoff=0.0)
-            faults.append(Fault(f"{side}.{role}", values[side].pop(role), "unknown topic", f"The nearest is `{near[0]}`."))
+            remedy = f"The nearest is `{nearest(str(role), usual_values[side])}`."
+            faults.append(Fault(f"{side}.{role}", values[side].pop(role), "unknown topic", remedy))
         for role, topic in values[side].items():
             if isinstance(topic, dict) and topic["type"] != (usual_type := usual_values[side][role]["type"]):
                 bound = f"only {usual_type} is read or filled there"
@@ -184,8 +184,8 @@ def _fault(detail: ErrorDetails, *before: str) -> Fault:
     """Return a pydantic error as a fault of the file. `before` is the path of the validated value in the file."""
     place = [*before, *map(str, detail["loc"])]
     if detail["type"] == "extra_forbidden":
-        near = get_close_matches(place[-1], _model_at(place).model_fields, n=1, cutoff=0.0)
-        return Fault(".".join(place), detail["input"], "unknown key", f"The nearest known key here is `{near[0]}`.")
+        near = nearest(place[-1], [*_model_at(place).model_fields])
+        return Fault(".".join(place), detail["input"], "unknown key", f"The nearest known key here is `{near}`.")
     bound = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "it must")
     return Fault(".".join(place), detail["input"], bound, _REMEDIES.get(place[-1], _SEE))
 

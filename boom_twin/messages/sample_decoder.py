@@ -148,7 +148,7 @@ class SampleDecoder:
         self.strange_names: dict[Stream, tuple[list[str], list[str]]] = {}
 
     def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> list[Sample]:
-        """Return the samples that are complete with `msg`, which came by the topic of these `streams`; see `put`."""
+        """Return the samples that are complete with `msg`, which came by the topic of these `streams`; see `sample_of`."""
         odd, contested = self.oddities.total(), self.assembler.refused
         readings = [reading for stream in streams if (reading := self._reading(stream, stamp_ns, msg)) is not None]
         self.refused += not readings and self.oddities.total() > odd
@@ -200,7 +200,7 @@ class SampleDecoder:
         """Return True if the mapping expects this ``frame_id``, or any."""
         return frame == (self._frames.get(SENSORS[stream].beside or stream.value) or frame)
 
-    def put(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:
+    def sample_of(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:
         """Return the sample that a message of rclpy or of rosbags holds by itself; None if no value of it can be used."""
         reading = self._reading(stream, stamp_ns, msg)
         return None if reading is None else reading.sample

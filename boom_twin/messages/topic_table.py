@@ -202,16 +202,13 @@ class Topics(_Entry):
         space = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
         return self.renamed(lambda topic: topic.name if topic.name.startswith("/") else f"{space}{topic.absolute}")
 
-    def of_joints(self, ranges: Iterable[Sequence[float]]) -> Topics:
-        """Return these topics with the `ranges` (deg) of a scene's joints, which resolve the whole turns of an encoder."""
-        return self.model_copy(update={"ranges": tuple((radians(low) - GIVE, radians(high) + GIVE) for low, high in ranges)})
-
     def of_scene(self, joints: Sequence[Joint]) -> Topics:
-        """Return these topics of a scene: ranges of its joints, and areas of its cylinders, which turn pressures to forces.
+        """Return these topics of a scene: joint ranges, which resolve whole turns of encoders, and cylinder areas.
 
         Raise UsageError if the mapping says that there are pressures, but areas are not known.
         """
-        topics = self.of_joints(joint.range_deg for joint in joints)
+        ranges = tuple((radians(low) - GIVE, radians(high) + GIVE) for low, high in (joint.range_deg for joint in joints))
+        topics = self.model_copy(update={"ranges": ranges})
         topic, oils = self.inputs[Stream.PRESSURES], [joint.cylinder.oil for joint in joints]
         given: list[tuple[float, float] | None] = [None if oil is None else (oil.bore, oil.rod) for oil in oils]
         if topic.bore or topic.rod:

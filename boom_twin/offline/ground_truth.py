@@ -23,7 +23,6 @@ from ..types import NANO, Array
 FILE_NAME = "truth.csv.gz"
 LARGEST_TRUTH = 64 * 2**20  # bytes of an unpacked file that are read: about an hour at 200 Hz
 COLUMNS = ("t_s", "tip_x_m", "tip_y_m", "tip_ax_m_s2", "tip_ay_m_s2")
-LOAD_COLUMNS = ("tip_load_x_N", "tip_load_y_N")
 
 
 @dataclass(frozen=True)
@@ -33,12 +32,11 @@ class TipTruth:
     times: Array  # s after the start of the session; shape (m,)
     position: Array  # position, acceleration: m, m/s^2; x forward, y up; shape (m, 2)
     acceleration: Array
-    load: Array  # external force at the tip, N; 0 where the file has none; shape (m, 2)
 
     def since(self, offset: float) -> TipTruth:
         """Return the truth from `offset` (s) after its beginning on."""
         kept = self.times >= self.times[0] + offset - 0.5 * NANO
-        return TipTruth(self.times[kept], self.position[kept], self.acceleration[kept], self.load[kept])
+        return TipTruth(self.times[kept], self.position[kept], self.acceleration[kept])
 
     def at(self, times: Array, values: Array) -> Array:
         """Return one of the truth's arrays at other times, shape (k, 2)."""
@@ -98,18 +96,11 @@ def load_truth(folder: Path) -> TipTruth | None:
         names = header.decode("ascii", "replace").strip().split(",")
         if lacking := [name for name in COLUMNS if name not in names]:
             raise ValueError(f"no column {lacking[0]}")
-        places = [i for i, name in enumerate(names) if name in COLUMNS + LOAD_COLUMNS]
-        columns = np.loadtxt(BytesIO(rows), delimiter=",", ndmin=2, unpack=True, usecols=places)
-        values = dict(zip([names[i] for i in places], columns, strict=True))
-        loads = [values.get(name, np.zeros_like(values["t_s"])) for name in LOAD_COLUMNS]
+        places = list(map(names.index, COLUMNS))
+        times, x, y, ax, ay = np.loadtxt(BytesIO(rows), delimiter=",", ndmin=2, unpack=True, usecols=places)
     except (OSError, ValueError, EOFError) as error:
         raise BagError(f"{path}: {error}. It needs columns {', '.join(COLUMNS)}; remove it to replay without.") from None
-    return TipTruth(
-        values["t_s"],
-        np.column_stack([values["tip_x_m"], values["tip_y_m"]]),
-        np.column_stack([values["tip_ax_m_s2"], values["tip_ay_m_s2"]]),
-        np.column_stack(loads),
-    )
+    return TipTruth(times, np.column_stack([x, y]), np.column_stack([ax, ay]))
 
 
 def truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list[str]) -> TipTruth | None:

@@ -16,7 +16,7 @@ import numpy as np
 from .. import __version__
 from ..bag.reader import Session
 from ..bag.session_file import WHOLE, TimeWindow
-from ..bag.session_model import SessionScene, SessionSheet, scene_from
+from ..bag.session_model import SessionMetadata, SessionScene, scene_from
 from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
 from ..errors import BagError
@@ -168,8 +168,8 @@ def replay(
 
         kept, place = scene_from(scene), building / SESSION
         place.mkdir()
-        sheet, own = SessionSheet(__version__, kept.text), None if mapping is None else Path(mapping)
-        import_session([table_of_frame(bag)], place, ColumnFile(), sheet, len(kept.scene.joints), own)
+        metadata, own = SessionMetadata(__version__, kept.text), None if mapping is None else Path(mapping)
+        import_session([table_of_frame(bag)], place, ColumnFile(), metadata, len(kept.scene.joints), own)
         found = replay_into(building, place, kept, settings, options)
         return replace(found, session=replace(found.session, path=Path(out) / SESSION))
 
@@ -244,7 +244,7 @@ def replay_into(
             f"{_explained(twin.counts)}"
         )
     if options.with_bag:
-        SessionSheet(__version__, given.kept.text, strokes=given.strokes.reading).write(out / "bag")
+        SessionMetadata(__version__, given.kept.text, strokes=given.strokes.reading).write(out / "bag")
     file = out / "bag" / FILE_NAME if options.with_bag else None
     summary = summary_of(recording, twin.counts, wall, file) | clocks_of(twin.clocks) | given.summary
     if errors is not None:

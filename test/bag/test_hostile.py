@@ -17,7 +17,7 @@ import pytest
 import zstandard
 from command import main
 from mcap.writer import MCAP0_MAGIC
-from recordings import METADATA, SHEET, MessageWriter, read, recover, scan
+from recordings import METADATA, SESSION_YAML, MessageWriter, read, recover, scan
 from ros_messages import load_topics
 
 from boom_twin import BagError, Stream
@@ -61,7 +61,7 @@ def test_yaml_gives_plain_values_of_bounded_size_only(tmp_path: Path, monkeypatc
     assert plain("") is None and plain("&a x") == "x" and plain("[&a [1], *a]") == [[1], [1]]
 
 
-@pytest.mark.parametrize("file", [METADATA, SHEET])
+@pytest.mark.parametrize("file", [METADATA, SESSION_YAML])
 @pytest.mark.parametrize("bomb", BOMBS)
 @pytest.mark.system
 def test_a_command_survives_bombs_beside_a_bag(bag: Path, bomb: str, file: str, tmp_path: Path) -> None:
@@ -102,12 +102,12 @@ def test_names_in_metadata_do_not_lead_outside(bag: Path, name: str, tmp_path: P
 def test_recovery_writes_into_its_folder_alone(bag: Path, tmp_path: Path) -> None:
     text = (bag / METADATA).read_text()
     (bag / METADATA).write_text(text.replace("session_0.mcap", "../../escaped.mcap"))
-    (bag / SHEET).write_text("mapping: ''\n")
+    (bag / SESSION_YAML).write_text("mapping: ''\n")
     before = set(tmp_path.rglob("*"))
     recover(bag, tmp_path / "out")
     made = {path.relative_to(tmp_path).as_posix() for path in set(tmp_path.rglob("*")) - before}
-    assert made == {"out", "out/session_0.mcap", f"out/{METADATA}", f"out/{SHEET}"}
-    assert (tmp_path / "out" / SHEET).read_text() == "mapping: ''\n"
+    assert made == {"out", "out/session_0.mcap", f"out/{METADATA}", f"out/{SESSION_YAML}"}
+    assert (tmp_path / "out" / SESSION_YAML).read_text() == "mapping: ''\n"
 
 
 def write_raw(directory: Path, *bodies: bytes) -> Path:

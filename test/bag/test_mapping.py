@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from recordings import SHEET as FILE_NAME
-from recordings import SessionSheet, load_mapping, mapping_of
+from recordings import SESSION_YAML as FILE_NAME
+from recordings import SessionMetadata, load_mapping, mapping_of
 from ros_messages import load_topics
 
 from boom_twin import BagError, Stream, UsageError
@@ -153,7 +153,7 @@ def test_whatever_stands_in_a_mapping_is_used_or_refused(document: dict[str, Any
 
 def recorded(directory: Path, mapping: str) -> Path:
     directory.mkdir(exist_ok=True)
-    SessionSheet("1", "scene", "parameters", mapping, {}).write(directory)
+    SessionMetadata("1", "scene", "parameters", mapping, {}).write(directory)
     return directory
 
 

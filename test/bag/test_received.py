@@ -20,7 +20,7 @@ from boom_twin.report.quantities import FILE_NAME as QUANTITIES
 from boom_twin.report.quantities import read, side_of
 from boom_twin.system.received_files import open_received
 
-MCAP, METADATA, SHEET, SUMMARY = "session_0.mcap", "metadata.yaml", "session.yaml", "summary.json"
+MCAP, METADATA, SESSION_YAML, SUMMARY = "session_0.mcap", "metadata.yaml", "session.yaml", "summary.json"
 LINK = "a symbolic link"
 KINDS = {"link": LINK, "loose link": LINK, "pipe": "a named pipe", "socket": "a socket", "folder": "a directory"}
 
@@ -68,7 +68,7 @@ def test_what_is_no_file_is_refused_by_its_name(bag: Path, kind: str, tmp_path: 
     refused(result / SUMMARY, lambda: side_of(result, lambda path: path))
     refused(result / QUANTITIES, lambda: read(result))
     refused(bag / TRUTH, lambda: load_truth(bag))
-    refused(bag / SHEET, lambda: mapping_of(bag), rescue)
+    refused(bag / SESSION_YAML, lambda: mapping_of(bag), rescue)
     refused(bag / METADATA, lambda: scan(bag), rescue)
     (bag / METADATA).unlink() if kind != "folder" else (bag / METADATA).rmdir()
     refused(bag / MCAP, lambda: scan(bag), rescue)
@@ -77,7 +77,7 @@ def test_what_is_no_file_is_refused_by_its_name(bag: Path, kind: str, tmp_path: 
 
 COMMANDS = (
     (METADATA, ["info", "bag"]),
-    (SHEET, ["replay", "bag", "--out", "out"]),
+    (SESSION_YAML, ["replay", "bag", "--out", "out"]),
     (METADATA, ["monitor", "--bag", "bag", "--port", "0"]),
 )
 

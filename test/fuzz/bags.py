@@ -30,7 +30,7 @@ from .mutate import DAMAGES, damaged, flipped, pick, rearranged
 from .odd_yaml import odd
 from .verdict import Kind, Verdict, printed, worst
 
-FILE, METADATA, SHEET = "session_0.mcap", "metadata.yaml", "session.yaml"
+FILE, METADATA, SESSION_YAML = "session_0.mcap", "metadata.yaml", "session.yaml"
 ROWS = 16
 SECRET = b"a secret outside of the session"
 REPLAYED = 8
@@ -55,7 +55,7 @@ def base() -> Path:
     path = Path(_home().name) / "base"
     angles = np.tile(posture_angles(scene, "arch"), (ROWS, 1))
     write_session(path, stamps, strokes, angles, imu, {"origin": "synthetic, a test"})
-    (path / SHEET).write_text("origin: synthetic, a test\nnote: null\nscene: ''\nparameters: ''\nmapping: ''\n")
+    (path / SESSION_YAML).write_text("origin: synthetic, a test\nnote: null\nscene: ''\nparameters: ''\nmapping: ''\n")
     return path
 
 
@@ -75,7 +75,7 @@ def _messages(session: Session) -> list[Message]:
     found = []
     for file in session.files:
         with as_bag_error(file.path):
-            for channel, time, data in file.heads():
+            for channel, time, data in file.messages():
                 found.append((file.channels[channel].topic, time, data))
     return found
 
@@ -96,13 +96,13 @@ def make(random: Generator, path: Path) -> Path:
     """Write a damaged session, a folder with or without metadata, or a bare file."""
     if random.random() < 0.5:
         path.mkdir()
-        for name in (FILE, METADATA, SHEET):
+        for name in (FILE, METADATA, SESSION_YAML):
             (path / name).write_bytes((base() / name).read_bytes())
         how = random.random()
         if how < 0.3:
             _edit(random, path / METADATA)
         elif how < 0.4:
-            _edit(random, path / SHEET)
+            _edit(random, path / SESSION_YAML)
         elif how < 0.5:
             _link(random, path)
         else:
@@ -129,7 +129,7 @@ def _link(random: Generator, path: Path) -> None:
     """One of the files is a link to something else."""
     secret = path.with_name("secret")
     secret.write_bytes(SECRET)
-    file = path / str(pick(random, (FILE, METADATA, SHEET)))
+    file = path / str(pick(random, (FILE, METADATA, SESSION_YAML)))
     file.unlink()
     file.symlink_to(pick(random, (secret, "/dev/zero", "/etc/passwd", file.name, ".", "nothing")))
 

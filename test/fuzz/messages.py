@@ -210,7 +210,7 @@ class _Listener:
             found, expected = (getattr(each, SENSORS[stream].field) for each in (message, whole))
             if list(whole.name) != list(message.name) or not np.array_equal(expected, found, equal_nan=True):
                 return "read otherwise than a full decoder reads it"
-        return self._decoder.put(stream, stamp, message)
+        return self._decoder.sample_of(stream, stamp, message)
 
     def _show(self, key: Output, data: bytes) -> str:
         name, topic_rows, store = self._topics.outputs[key].absolute, self._feed.topic_rows, self._feed.store

@@ -33,7 +33,7 @@ class Wire:
         stamp, msg = self.decoder.read(data)
         assert stamp == stamp_of(decoded)
         mine, theirs = SampleDecoder(4), SampleDecoder(4)
-        ours, other = mine.put(self.stream, stamp, msg), theirs.put(self.stream, stamp, decoded)
+        ours, other = mine.sample_of(self.stream, stamp, msg), theirs.sample_of(self.stream, stamp, decoded)
         assert mine.oddities == theirs.oddities
         assert (ours and ours.values.tobytes()) == (other and other.values.tobytes())
         return msg

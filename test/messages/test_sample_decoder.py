@@ -11,12 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ros_messages import SampleDecoder, Topics, imu, joint_state, load_topics, new_message
 
-from boom_twin import Stream
+from boom_twin import Stream, load_scene
 from boom_twin.messages.mapping import mapping_from
 from boom_twin.messages.sample_decoder import MOST_NAMES, ODDITIES
 from boom_twin.messages.topic_table import Sensor, usual
 from boom_twin.types import SENSORS
 
+SCENE, RANGES = load_scene(), [(-165.0, 10.0), (-5.0, 85.0)]
 FINITE = st.floats(-1e6, 1e6)
 OTHER_NAMES = st.text(max_size=12).filter(lambda name: not name.startswith(("joint_", "cylinder_")))
 
@@ -29,7 +30,7 @@ def test_any_order_and_extra_names(values: list[float], others: list[tuple[str, 
     pairs = [(f"joint_{i}", value) for i, value in enumerate(values, 1)] + others
     mixed = data.draw(st.permutations(pairs))
     decoder = SampleDecoder(len(values))
-    sample = decoder.put(Stream.ANGLES, 12, joint_state([n for n, _ in mixed], [v for _, v in mixed]))
+    sample = decoder.sample_of(Stream.ANGLES, 12, joint_state([n for n, _ in mixed], [v for _, v in mixed]))
     assert sample is not None and (sample.stream, sample.stamp) == (Stream.ANGLES, 12)
     assert sample.values.tolist() == values
     assert not decoder.oddities
@@ -45,7 +46,7 @@ def test_what_is_left_is_right_and_the_rest_is_nan(values: list[float], present:
     """Whatever is wrong with a message: a value in the sample is the one under that name, or NaN."""
     names = [f"cylinder_{i + 1}" for i in sorted(present)]
     positions = [values[i] for i in sorted(present)][:cut]
-    sample = SampleDecoder(3).put(Stream.STROKES, 1, joint_state(names, positions))
+    sample = SampleDecoder(3).sample_of(Stream.STROKES, 1, joint_state(names, positions))
     usable = {i: values[i] for i in sorted(present)[:cut] if abs(values[i]) <= 1e7}
     if not usable:
         assert sample is None
@@ -76,7 +77,7 @@ def test_oddities_are_counted_by_name(
 ) -> None:
     decoder = SampleDecoder(2)
     for number in (1, 2):
-        sample = decoder.put(Stream.STROKES, 5, joint_state(names, positions))
+        sample = decoder.sample_of(Stream.STROKES, 5, joint_state(names, positions))
         assert decoder.oddities == {name: number * count for name, count in oddities.items()}
         assert (sample is None) == (expected is None)
         if sample is not None:
@@ -85,10 +86,10 @@ def test_oddities_are_counted_by_name(
 
 def test_names_that_are_not_the_scenes_are_noted_beside_those_that_are_not_there() -> None:
     decoder = SampleDecoder(2)
-    decoder.put(Stream.STROKES, 1, joint_state(["cylinder_1", "cylinder2", "swing"], [0.1, 0.2, 0.3]))
-    decoder.put(Stream.ANGLES, 1, joint_state(["joint_1"], [0.1]))
+    decoder.sample_of(Stream.STROKES, 1, joint_state(["cylinder_1", "cylinder2", "swing"], [0.1, 0.2, 0.3]))
+    decoder.sample_of(Stream.ANGLES, 1, joint_state(["joint_1"], [0.1]))
     assert decoder.strange_names == {Stream.STROKES: (["cylinder_2"], ["cylinder2", "swing"])}
-    decoder.put(Stream.ANGLES, 2, joint_state(["a", "b"], [0.1, 0.2]))
+    decoder.sample_of(Stream.ANGLES, 2, joint_state(["a", "b"], [0.1, 0.2]))
     assert decoder.strange_names[Stream.ANGLES] == (["joint_1", "joint_2"], ["a", "b"])
 
 
@@ -98,7 +99,7 @@ def test_names_that_are_not_the_scenes_are_noted_beside_those_that_are_not_there
 )
 def test_an_imu_gives_x_and_z(x: float, covariance: float, values: list[float] | None, oddities: dict[str, int]) -> None:
     decoder = SampleDecoder(4)
-    sample = decoder.put(Stream.IMU, 9, imu(x, 9.81, covariance=covariance))
+    sample = decoder.sample_of(Stream.IMU, 9, imu(x, 9.81, covariance=covariance))
     assert (sample is None) == (values is None) and dict(decoder.oddities) == oddities
     if sample is not None:
         np.testing.assert_array_equal(sample.values, values)
@@ -107,16 +108,16 @@ def test_an_imu_gives_x_and_z(x: float, covariance: float, values: list[float] |
 @pytest.mark.parametrize(("stamp", "name"), [(-1, "impossible stamp"), (2**31 * 10**9, "impossible stamp"), (0, "no stamp")])
 def test_impossible_stamps_give_no_sample(stamp: int, name: str) -> None:
     decoder = SampleDecoder(1)
-    assert decoder.put(Stream.STROKES, stamp, joint_state(["cylinder_1"], [0.1])) is None
+    assert decoder.sample_of(Stream.STROKES, stamp, joint_state(["cylinder_1"], [0.1])) is None
     assert decoder.oddities == {name: 1}
 
 
 def test_a_flood_of_names_is_not_looked_through() -> None:
     decoder = SampleDecoder(1)
     names = [*(f"x{i}" for i in range(MOST_NAMES)), "cylinder_1"]
-    assert decoder.put(Stream.STROKES, 1, joint_state(names, [0.1] * len(names))) is None
+    assert decoder.sample_of(Stream.STROKES, 1, joint_state(names, [0.1] * len(names))) is None
     assert decoder.oddities == {"too many names": 1} and f"more than {MOST_NAMES}" in ODDITIES["too many names"]
-    assert decoder.put(Stream.STROKES, 2, joint_state(names[1:], [0.1] * MOST_NAMES)) is not None
+    assert decoder.sample_of(Stream.STROKES, 2, joint_state(names[1:], [0.1] * MOST_NAMES)) is not None
 
 
 def mapped(sensors: dict[str, Any], **names: str) -> Topics:
@@ -141,7 +142,9 @@ def mapped(sensors: dict[str, Any], **names: str) -> Topics:
 def test_a_sensor_reads_as_it_is_mapped(channel: str, given: dict[str, Any], reading: float, expected: float) -> None:
     stream = Stream.STROKES if channel.startswith("cyl") else Stream.ANGLES
     other = {"cylinder_2": "cylinder_1", "joint_1": "joint_2"}[channel]
-    sample = SampleDecoder(2, mapped({channel: given})).put(stream, 1, joint_state([given["name"], other], [reading, 0.7]))
+    sample = SampleDecoder(2, mapped({channel: given})).sample_of(
+        stream, 1, joint_state([given["name"], other], [reading, 0.7])
+    )
     assert sample is not None
     values = dict(zip(SENSORS[stream].channels(2), sample.values.tolist(), strict=True))
     assert values == {channel: pytest.approx(expected, rel=1e-12), other: 0.7}
@@ -152,10 +155,12 @@ def test_one_topic_for_both_kinds() -> None:
     decoder = SampleDecoder(1, mapped({"joint_1": {"name": "a"}}, cylinder_strokes="/rig", joint_angles="/rig"))
     both = joint_state(["other", "a", "cylinder_1"], [9.0, 0.1, 0.2])
     angles, strokes, neither = joint_state(["a"], [0.3]), joint_state(["cylinder_1"], [0.4]), joint_state(["joint_1"], [1.0])
-    samples = [decoder.put(stream, 1, msg) for msg in (both, angles, strokes) for stream in (Stream.STROKES, Stream.ANGLES)]
+    samples = [
+        decoder.sample_of(stream, 1, msg) for msg in (both, angles, strokes) for stream in (Stream.STROKES, Stream.ANGLES)
+    ]
     found = [None if sample is None else sample.values.tolist() for sample in samples]
     assert found == [[0.2], [0.1], None, [0.3], [0.4], None] and not decoder.oddities
-    assert decoder.put(Stream.STROKES, 1, neither) is None and decoder.oddities == {"unknown names only": 1}
+    assert decoder.sample_of(Stream.STROKES, 1, neither) is None and decoder.oddities == {"unknown names only": 1}
 
 
 MS = 1_000_000
@@ -206,10 +211,11 @@ def test_messages_that_always_lack_a_name_are_samples_once_the_next_one_comes() 
 )
 def test_an_encoder_a_turn_off_is_taken_modulo_a_turn_where_its_range_decides(reading: float, expected: float) -> None:
     """Half a turn off is an offset, and what is many turns off is in degrees: neither is hidden."""
-    decoder = SampleDecoder(2, load_topics().of_joints([(-165.0, 10.0), (-5.0, 85.0)]))
+    joints = [joint.model_copy(update={"range_deg": each}) for joint, each in zip(SCENE.joints, RANGES, strict=False)]
+    decoder = SampleDecoder(2, load_topics().of_scene(joints))
     ((_, values),) = cycles(decoder, [(1, {"joint_1": np.radians(reading), "joint_2": np.radians(60.0)})])
     np.testing.assert_allclose(np.degrees(values), [expected, 60.0], atol=1e-9)
-    inclinometer = SampleDecoder(1, mapped({"joint_1": {"absolute": "root"}}).of_joints([(-165.0, 10.0)]))
+    inclinometer = SampleDecoder(1, mapped({"joint_1": {"absolute": "root"}}).of_scene(joints[:1]))
     assert cycles(inclinometer, [(1, {"joint_1": 5.0})]) == [(1, [5.0])]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from default_boom import default_text
 from recordings import TRUTH as FILE_NAME
-from recordings import MessageWriter, SessionSheet, sensor_message
+from recordings import MessageWriter, SessionMetadata, sensor_message
 from ros_messages import every_input, jazzy
 
 from boom_twin import Sample, Stream, load_scene
@@ -55,5 +55,5 @@ def write(folder: Path, session: RigSession, mapping: str, lag: float = LAG, dri
                     kind = topics[stream.value].type
                     bag.write_encoded(stream.value, stamp, bytes(jazzy().serialize_cdr(message, kind)))
     session.save_truth(folder / FILE_NAME)
-    SessionSheet("test", default_text(), mapping=mapping).write(folder)
+    SessionMetadata("test", default_text(), mapping=mapping).write(folder)
     return folder

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from default_boom import anew
 from oracle import booms
-from recordings import SessionSheet, write_session
+from recordings import SessionMetadata, write_session
 
 from boom_twin import load_scene, statics
 
@@ -41,5 +41,5 @@ def session(path: Path, text: str, *, keep: bool, rows: int = 300, bias: float =
     joints += noise.normal(0.0, 2e-4, joints.shape)
     write_session(path, START + np.arange(rows) * STEP, read, joints, None, {"origin": "synthetic, a test"})
     if keep:
-        SessionSheet("0", text).write(path)
+        SessionMetadata("0", text).write(path)
     return path

@@ -24,7 +24,7 @@ def test_duration_and_errors_go_by_the_time_that_passed(shift):
     samples = block_of([Sample(Stream.STROKES, stamp, still) for stamp in stamps], 4)
     rows = twin.take(samples)
     position = np.tile(rows.predictions.tip_position[0], (200, 1)) + (np.arange(200) >= 120)[:, np.newaxis]
-    errors = TipErrors(TipTruth(np.arange(200) * 0.005, position, np.zeros((200, 2)), np.zeros((200, 2))))
+    errors = TipErrors(TipTruth(np.arange(200) * 0.005, position, np.zeros((200, 2))))
     recording = Recording(4, errors=errors)
     recording.add(rows, samples)
     recording.close()

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from recordings import MessageWriter, SessionSheet, read_both, scan
+from recordings import MessageWriter, SessionMetadata, read_both, scan
 from ros_messages import TYPES, fill_header, jazzy, load_topics, stamp_of
 
 from boom_twin import Stream, load_scene, replay
@@ -44,7 +44,7 @@ def test_a_delay_that_is_mapped_leaves_no_trace(tmp_path: Path) -> None:
     assert all(scan(right).find(load_topics().inputs[stream].name).count for stream in DELAYS)
     digests = [replay(bag, scene, tmp_path / f"{bag.name}_out").summary["output_sha256"] for bag in (right, late)]
     assert digests[0] != digests[1]
-    SessionSheet("test", "", "", MAPPING, {}).write(late)
+    SessionMetadata("test", "", "", MAPPING, {}).write(late)
     found = replay(late, scene, tmp_path / "mapped_out").summary
     assert found["mapping"].endswith("session.yaml, mapping")
     assert found["output_sha256"] == digests[0]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
-from recordings import MessageWriter, SessionSheet, write_session
+from recordings import MessageWriter, SessionMetadata, write_session
 from ros_messages import fill_header, load_topics, new_message
 from session_readings import rows_in
 
@@ -65,7 +65,7 @@ def rig(arrays, tmp_path_factory):
                 values = {**own, **values}
             msg.name, msg.position = list(values), np.array([*values.values()])
             bag.write("all", int(stamp), msg)
-    SessionSheet("test", "", "", MAPPING, {}).write(path)
+    SessionMetadata("test", "", "", MAPPING, {}).write(path)
     return path
 
 

@@ -12,8 +12,8 @@ from drive_twin import note_drives
 from health.recorded import ARCH, run
 from health.recorded import session as recorded
 from offline.booms_apart import scene_text, session
-from recordings import SHEET as FILE_NAME
-from recordings import MessageWriter, SessionSheet, scene_of
+from recordings import SESSION_YAML as FILE_NAME
+from recordings import MessageWriter, SessionMetadata, scene_of
 from ros_messages import fill_header, load_topics, new_message
 
 from boom_twin import BagError, Settings, Stream, Twin, load_scene, replay
@@ -135,7 +135,7 @@ def test_the_given_scene_comes_first_then_the_sessions_then_the_default(four, fi
 )
 def test_a_broken_scene_in_a_session_is_one_line_with_the_remedy(text, words, tmp_path, capsys):
     write_names(tmp_path / "bag", ["cylinder_1"])
-    SessionSheet("0", text).write(tmp_path / "bag")
+    SessionMetadata("0", text).write(tmp_path / "bag")
     for command in (["info", str(tmp_path / "bag")], arguments(tmp_path / "bag", tmp_path / "out")):
         assert main(command) == 1
         told = capsys.readouterr().err

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from recordings import SHEET as FILE_NAME
-from recordings import SessionSheet
+from recordings import SESSION_YAML as FILE_NAME
+from recordings import SessionMetadata
 
 from boom_twin import BagError, Settings, UsageError
 from boom_twin.bag.session_model import settings_of
@@ -19,7 +19,7 @@ BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 def test_the_parameters_are_those_of_the_node_that_was_recorded(tmp_path, capsys):
     """A replay with others was another one, without a word."""
     assert settings_of(BUNDLED).settings == Settings()
-    SessionSheet("0", twin={"imu_sigma": 0.2, "payload": 30.0, "scene": "", "autostart": True}).write(tmp_path)
+    SessionMetadata("0", twin={"imu_sigma": 0.2, "payload": 30.0, "scene": "", "autostart": True}).write(tmp_path)
     found = settings_of(tmp_path)
     assert (found.settings, found.source) == (Settings(imu_sigma=0.2, payload=30.0), f"{tmp_path / FILE_NAME}, twin")
     assert open_session_settings(tmp_path, None) == found.settings
@@ -28,7 +28,7 @@ def test_the_parameters_are_those_of_the_node_that_was_recorded(tmp_path, capsys
     given.write_text("/**:\n  ros__parameters:\n    imu_sigma: 0.1\n", encoding="utf-8")
     assert settings_of(tmp_path, given).settings == Settings(imu_sigma=0.1)
     for wrong in ({"imu_sigma": -1.0}, {"stroke_rate": -1.0}, {"gap": "a while"}):
-        SessionSheet("0", twin=wrong).write(tmp_path)
+        SessionMetadata("0", twin=wrong).write(tmp_path)
         with pytest.raises(BagError, match=rf"session\.yaml, twin: {next(iter(wrong))} .*--params"):
             settings_of(tmp_path)
 

@@ -111,7 +111,7 @@ class TopicRows:
         self._store, self._decoder = store, SampleDecoder(1, topics)
         store.driven_by = topics.stroke_reading.stream
         self.dropped = DroppedMessages()
-        self._forces_felt, self._estimates = PartsOfRows((COMPARED, Output.RESIDUALS)), PartsOfRows(JOINED)
+        self._specific_forces, self._estimates = PartsOfRows((COMPARED, Output.RESIDUALS)), PartsOfRows(JOINED)
         self._forces: list[float] = []
         self._strokes: list[float] = []
         self.scene, self._now = "", 0.0  # name of the node's scene, empty until it is known
@@ -152,12 +152,12 @@ class TopicRows:
         generation = self._store.generation
         self._store.receive(table, columns, stamp, values)
         if self._store.generation != generation:  # time was set back
-            self._forces_felt.waiting.clear()
+            self._specific_forces.waiting.clear()
             self._estimates.waiting.clear()
 
     def _take_measured(self, msg: Any) -> None:
         before = self._decoder.oddities.copy()
-        sample = self._decoder.put(COMPARED, stamp_of(msg), msg)
+        sample = self._decoder.sample_of(COMPARED, stamp_of(msg), msg)
         odd = self._decoder.oddities - before
         if sample is not None:
             self.measure(sample)
@@ -204,7 +204,7 @@ class TopicRows:
             self._append(RESIDUALS[stream], [f"{name}_{end}" for end in ends for name in msg.name], stamp, values + ratios)
 
     def _join_force(self, part: Hashable, stamp: int, values: list[float]) -> None:
-        if (parts := self._forces_felt.put(part, stamp, values)) is not None:
+        if (parts := self._specific_forces.put(part, stamp, values)) is not None:
             (x, z), (left_x, left_z, *sigmas) = parts
             self._append("force", FORCE_COLUMNS, stamp, [x, z, x - left_x, z - left_z, *sigmas])
 

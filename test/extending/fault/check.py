@@ -20,7 +20,7 @@ streams, decoder = {f"/{topics[stream].name}": stream for stream in RECORDED}, S
 for name, log, message in read(session, {name: topics[stream].type for name, stream in streams.items()}):
     if (log - session.start) * NANO > LAST:
         break
-    sample = decoder.put(streams[name], stamp_of(message), message)
+    sample = decoder.sample_of(streams[name], stamp_of(message), message)
     found[sample.stream].append((sample.stamp, sample.values))
 stamps = np.array([stamp for stamp, _ in found[Stream.STROKES]])
 strokes, joints, imu = (np.array([values for _, values in found[s]]) for s in RECORDED)

@@ -71,7 +71,7 @@ mapping.write_text(f"sensors: {{{CHANNEL}: {{unit: deg}}}}\n")
 write_samples(Path("session"), samples, (Stream.STROKES, Stream.ANGLES, INCLINATION), {"origin": "synthetic"})
 ((_, _, message), *_) = read(scan(Path("session")), {f"/{CHANNEL}": "sensor_msgs/msg/JointState"})
 decoder = SampleDecoder(4, load_mapping(mapping, 4))
-assert math.isclose(decoder.put(INCLINATION, stamp_of(message), message).values[0], math.radians(message.position[0]))
+assert math.isclose(decoder.sample_of(INCLINATION, stamp_of(message), message).values[0], math.radians(message.position[0]))
 
 lines = default_text().replace("\nbase:\n", f"\nbase:\n  inclination: {SLOPE}\n")
 Path("scene.yaml").write_text(lines)
