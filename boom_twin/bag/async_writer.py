@@ -20,12 +20,7 @@ from .writer import BagWriter
 class Syncer:
     """Thread that calls ``fsync`` on files; requests come from one other thread.
 
-    Attributes
-    ----------
-    done : int
-        The mark of the newest request that is on the disk.
-    time : float
-        Time of that request, s of `time.monotonic`.
+    `done` is the mark of the newest request that is on the disk, and `time` (s of `time.monotonic`) that of this request.
     """
 
     def __init__(self) -> None:

@@ -85,21 +85,11 @@ def import_session(
 ) -> ImportedSession:
     """Write tables as a session into the new or empty folder `out`.
 
-    Parameters
-    ----------
-    given : ColumnFile
-        Columns, times and time zone that headers do not give.
-    joints : int, optional
-        Number of joints of the scene, if there is one.
-    mapping : Path, optional
-        Names, units, signs and zeros of the rig's sensors, kept in the session.
+    `given` are columns, times and time zone that headers do not give. `joints` is that number of the scene, if there is one.
+    The session keeps the `mapping` (names, units, signs and zeros of the rig's sensors).
 
-    Raises
-    ------
-    BagError
-        A table cannot be read, a cylinder has no column, a column has no unit, or the tables have no time in common.
-    UsageError
-        The mapping or the time zone cannot be used.
+    Raise BagError if a table cannot be read, a cylinder has no column, a column has no unit, or the tables have no time in
+    common; UsageError if the mapping or the time zone cannot be used.
     """
     assignment = assign(tables, given, joints)
     joints = joints or assignment.joints

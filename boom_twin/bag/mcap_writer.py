@@ -182,10 +182,7 @@ class McapWriter:
 class _OpenChunk:
     """Records of a chunk that is not yet compressed.
 
-    Attributes
-    ----------
-    entries : dict of int to bytearray
-        Index entries (log time and place of every message) by channel, in the order of their first messages.
+    `entries` are its index (log time and place of every message) by channel, in the order of their first messages.
     """
 
     def __init__(self) -> None:

@@ -247,26 +247,13 @@ def _overlap(files: Sequence[SessionFile]) -> str:
 
 
 def read(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE) -> Iterator[tuple[str, int, Any]]:
-    """Return an iterator over the decoded messages of some topics, in the order of log times.
+    """Return an iterator over topic (as in `wanted`), log time (ns) and decoded message, in the order of log times.
 
-    Parameters
-    ----------
-    wanted : dict of str to str
-        Message type by topic, with or without the leading slash.
-    window : TimeWindow, optional
-        Time window; messages outside it are left out.
+    `wanted` has the message type by topic, with or without the leading slash. Messages outside the `window` are left out.
 
-    Returns
-    -------
-    iterator of (str, int, message)
-        The topic as in `wanted`, log time in nanoseconds, message of rosbags.
-
-    Raises
-    ------
-    BagError
-        At once if a topic is missing, empty, or of another type, encoding or definition; while iterating if a checksum
-        does not fit, a message cannot be decoded, or none is in the window; at the end if the files did not hold what their
-        statistics say.
+    Raise BagError at once if a topic is missing, empty, or of another type, encoding or definition. Raise it while iterating if
+    a checksum does not fit, a message cannot be decoded, or none is in the window; at the end if the files did not hold what
+    their statistics say.
     """
     return ((name, time, message) for name, time, _, message in read_both(session, wanted, window))
 

@@ -237,20 +237,11 @@ class Source(NamedTuple):
 class SessionBlocks:
     """Iterable over blocks of the messages of some topics, sorted by log time, then by file.
 
-    Parameters
-    ----------
-    files : sequence of (SessionFile, set of int)
-        Files, each with the channels to read.
-    asked : mapping of str to str
-        Name by which each topic is requested, by its name in the files.
-    window : TimeWindow
-        Time window; messages outside it are left out.
+    `files` come with the channels to read. `asked` has the name by which each topic is requested, by its name in the files.
+    Messages outside the `window` are left out.
 
-    Raises
-    ------
-    BagError
-        While iterating: a checksum does not fit, or no message is in the window; at the end: the files did not hold what their
-        statistics say.
+    Raise BagError while iterating if a checksum does not fit, or no message is in the window; at the end if the files did not
+    hold what their statistics say.
     """
 
     def __init__(self, files: Sequence[tuple[SessionFile, set[int]]], asked: Mapping[str, str], window: TimeWindow) -> None:

@@ -32,12 +32,7 @@ def read_parameters(path: Path, namespace: str = "") -> dict[str, Any]:
     """Return the parameters that a ROS parameter file sets for the node ``boom_twin``, resolved as rclpy does.
 
     Every block whose name fits the node's full name counts: ``*`` stands for one part of it, ``**`` for any number of parts.
-    The last value of a parameter wins.
-
-    Raises
-    ------
-    UsageError
-        The file is no ROS parameter file, or has no block for this node.
+    The last value of a parameter wins. Raise UsageError if it is no ROS parameter file, or has no block for this node.
     """
     content = read_plain(path, UsageError, "Give a ROS parameter file.")
     node = "/".join(["", *filter(None, namespace.split("/")), "boom_twin"])

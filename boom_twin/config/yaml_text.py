@@ -53,11 +53,8 @@ def read_plain(path: Path, failure: type[BoomTwinError], remedy: str, received: 
 def plain(text: str) -> Any:
     """Return the values of a YAML text: dict, list, str, int, float, bool or None; None for an empty text.
 
-    Raises
-    ------
-    ValueError
-        It is not YAML; it has a value with a tag, a merge key, or a key twice; it holds more than `MOST_VALUES` values, or is
-        nested deeper than `DEEPEST`.
+    Raise ValueError if it is not YAML, has a value with a tag, a merge key, or a key twice, holds more than `MOST_VALUES`
+    values, or is nested deeper than `DEEPEST`.
     """
     return deepcopy(_plain(text))
 
@@ -116,12 +113,8 @@ class YamlReader:
     """Reader of an untrusted YAML text to a `Document` of plain values.
 
     No tag of the text can make an object: mappings become dict, sequences become `sequence`, scalars become float, int, bool,
-    str or None. What is YAML but not allowed here is in ``document.faults``.
-
-    Raises
-    ------
-    YAMLError, RecursionError, ValueError
-        The text is not YAML, holds more than `MOST_VALUES` values, or is nested too deeply.
+    str or None. What is YAML but not allowed here is in ``document.faults``. Raise YAMLError, RecursionError or ValueError if
+    the text is not YAML, holds more than `MOST_VALUES` values, or is nested too deeply.
     """
 
     def __init__(self, text: str, sequence: type[list[Any]] | type[tuple[Any, ...]]) -> None:
@@ -217,12 +210,9 @@ class BoundedComposer(Composer):
 
 
 def with_values(text: str, changes: Iterable[tuple[Place, Any]]) -> str:
-    """Return the text with other values. Comments stay, except those behind a removed key; lines in braces are wrapped anew.
+    """Return the text with other plain values by place; None removes a key. Missing blocks on the way to a place are added.
 
-    Parameters
-    ----------
-    changes : iterable of (place, value)
-        New plain values; None removes a key. Missing blocks on the way to a place are added.
+    Comments stay, except those behind a removed key; lines in braces are wrapped anew.
     """
     line_width = 120  # characters of a line in an edited text
     yaml, stream = YAML(), StringIO()

@@ -71,11 +71,8 @@ class Channel:
 class StreamWatch:
     """Statistics of one stream, computed when `look` is called. Times are in s, stamps in ns.
 
-    Attributes
-    ----------
-    lag : float
-        Least time from stamp to arrival between the last two looks, s; NaN without messages. It contains an unknown clock
-        offset. The difference of two streams' lags is the offset between their clocks.
+    `lag` is the least time from stamp to arrival between the last two looks, s; NaN without messages. It contains an unknown
+    clock offset. The difference of two streams' lags is the offset between their clocks.
     """
 
     def __init__(self, ranges: Array, monotonic: Callable[[], float] = time.monotonic) -> None:

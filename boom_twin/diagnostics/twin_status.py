@@ -115,20 +115,11 @@ class TwinWatch:
         wrong_names: Mapping[Stream, tuple[Level, str]] | None = None,
         words: Mapping[str, str] | None = None,
     ) -> list[Status]:
-        """Return the statuses of model, topics, health, sensors and residuals; while `idle`, of the model only.
+        """Return the statuses of model, topics, health, sensors and residuals; while `idle` (a reason), of the model only.
 
-        Parameters
-        ----------
-        counts, words : dict
-            Counts reported with the model; descriptions of counts by the last part of their names.
-        idle : str
-            Reason why the twin does not listen, or empty.
-        publishers, subscribers : dict of Stream to Peers, iterable of Peers
-            Peers of every input, and of all outputs.
-        reception : dict of str to Reception, optional
-            Reception by name of the topic; None if nothing is received live.
-        wrong_names : dict of Stream to tuple of Level and str, optional
-            Faults of inputs whose messages have names unknown to the scene.
+        `counts` are reported with the model, and `words` describe them by the last part of their names. `publishers` are the
+        peers of every input, `subscribers` those of all outputs. `reception` is by name of the topic, None if nothing is
+        received live. `wrong_names` are faults of inputs whose messages have names unknown to the scene.
         """
         at = Evaluation(self.thresholds, self._monotonic(), clock)
 

@@ -120,12 +120,7 @@ class Template:
     def fill(self, stamps: Integers, doubles: Array, singles: Sequence[float] = ()) -> list[Bytes]:
         """Return the bytes of each message, a row for each of the stamps.
 
-        Parameters
-        ----------
-        doubles : ndarray, shape (k, d)
-            Numbers in the order of the placeholders.
-        singles : sequence of float
-            Numbers of ``float32``, the same in every row.
+        `doubles` (k, d) are in the order of the placeholders; `singles`, of ``float32``, are the same in every row.
         """
         rows = np.empty((len(stamps), len(self._blank)), np.uint8)
         rows[:] = self._blank

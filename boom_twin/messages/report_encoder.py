@@ -222,19 +222,10 @@ class ReportEncoder:
         number_rows(self._chain, None, None, 1)
 
     def fill(self, report: Report, is_wanted: Callable[[Output], bool] = lambda output: True) -> Messages:
-        """Return the messages of one report.
+        """Return the wanted messages of one report; by default all.
 
-        Parameters
-        ----------
-        is_wanted : callable
-            Returns True for an output that is wanted; by default for all.
-
-        Returns
-        -------
-        list of (Output, bytes)
-            With a prediction: the outputs `PREDICTED`, ``joint_states``, `ESTIMATED`, and ``shape`` if it has one.
-            ``residuals`` for each set of residuals. ``changes`` with a change. ``health`` and ``tip_uncertainty`` (m) with
-            new health.
+        With a prediction: the outputs `PREDICTED`, ``joint_states``, `ESTIMATED`, and ``shape`` if it has one. ``residuals``
+        for each set of residuals. ``changes`` with a change. ``health`` and ``tip_uncertainty`` (m) with new health.
         """
         p, e, messages = report.prediction, report.estimate, Messages()
         if p is not None and any(map(is_wanted, self._outputs)):

@@ -41,17 +41,8 @@ class SampleAssembler:
     A sample has the stamp of the first message of its cycle. A cycle ends when it has all names. It also ends before a name
     that it has already, or before the name that began the previous cycle.
 
-    Parameters
-    ----------
-    oddities : Counter
-        Counter of ``names apart``, ``missing names`` and ``two sources``.
-    drive : Stream
-        The one that drives the model. The twin itself finds a second source of it.
-
-    Attributes
-    ----------
-    refused : int
-        Number of samples left out because of two sources.
+    ``names apart``, ``missing names`` and ``two sources`` are counted in `oddities`. Samples that are left out because of two
+    sources are counted in `refused`. The twin itself finds a second source of the stream that drives the model (`drive`).
     """
 
     def __init__(self, wanted: Mapping[Stream, NDArray[np.bool_]], oddities: Counter[str], drive: Stream) -> None:

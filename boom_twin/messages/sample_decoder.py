@@ -116,20 +116,7 @@ ODDITIES = {
 
 
 class SampleDecoder:
-    """Decoder of messages to samples, with counts of irregular messages.
-
-    Parameters
-    ----------
-    topics : Topics, optional
-        Topics and sensors of the rig; those of the package by default.
-
-    Attributes
-    ----------
-    strange_names : dict of Stream to tuple of list of str
-        Names missing in the first message that also had names unknown to the scene, and those unknown names.
-    delays : dict of Stream to int
-        Time from the stamp of a sample to that of its message, ns.
-    """
+    """Decoder of messages to samples by the `topics` (default: the package's), with counts of irregular messages."""
 
     def __init__(self, joints: int, topics: Topics | None = None) -> None:
         topics = topics or load_topics()
@@ -137,7 +124,7 @@ class SampleDecoder:
         self._channels = {stream: _Channels(topics, stream, joints) for stream in streams}
         pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
         self._sharing = pair if topics.is_shared else {}
-        self.delays = {stream: topics.delay(stream) for stream in self._channels}
+        self.delays = {stream: topics.delay(stream) for stream in self._channels}  # from a sample's stamp to its message's, ns
         self._frames = {stream.value: topic.frame_id for stream, topic in topics.inputs.items()}
         self._areas = topics.areas
         self.refused = 0  # number of messages without a usable value; one without any names and values is not counted
@@ -145,6 +132,7 @@ class SampleDecoder:
         wanted = {stream: each.wanted for stream, each in self._channels.items()}
         self.assembler = SampleAssembler(wanted, self.oddities, topics.stroke_reading.stream)
         self.other_boom_names: dict[Stream, list[str]] = {}  # names in the newest message that has names of another boom
+        # names missing in the first message that also had names unknown to the scene, and those unknown names
         self.strange_names: dict[Stream, tuple[list[str], list[str]]] = {}
 
     def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> list[Sample]:
@@ -159,14 +147,7 @@ class SampleDecoder:
     def many(self, streams: Iterable[Stream], stamps: Integers, msg: Any) -> list[tuple[Stream, Integers, Array]] | None:
         """Return streams, stamps (k,) in ns and values (k, channels) of the samples of many messages; None if any is irregular.
 
-        Parameters
-        ----------
-        streams : iterable of Stream
-            As for `samples`.
-        stamps : ndarray of int64, shape (k,)
-            At least two.
-        msg : message with arrays (k,) for numbers
-            From `boom_twin.messages.cdr_decoder.CdrDecoder.read_many`.
+        `stamps` (at least two) and `msg` are from `CdrDecoder.read_many`; `streams` are as for `samples`.
         """
         found, frame = list[tuple[Stream, Integers, Array]](), msg.frame if isinstance(msg, Axes) else ""
         for stream in streams:

@@ -196,16 +196,9 @@ TF_PREFIX = "TF Prefix:"  # key of the frame prefix in RViz's display of a robot
 
 
 def view_text(text: str, namespace: str = "", frame_prefix: str = "") -> str:
-    """Return the text of a view with the namespace and the frame prefix of a boom.
+    """Return the text of a view (one of `VIEWS`, or similar) for the ROS namespace and frame prefix (``front/``) of a boom.
 
-    Parameters
-    ----------
-    text : str
-        Text of one of `VIEWS`, or of a similar file.
-    namespace : str
-        ROS namespace of the twin. Quoted absolute names are put into it; relative ones, as RViz's, follow its own namespace.
-    frame_prefix : str
-        As the parameter of twin and robot_state_publisher: ``front/``.
+    Quoted absolute names are put into the namespace; relative ones, as RViz's, follow its own.
     """
     usual, there = load_topics(), load_topics().in_namespace(namespace)
     space = namespace.strip("/")

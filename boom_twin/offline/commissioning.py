@@ -93,21 +93,11 @@ def commission(
 ) -> Commissioning:
     """Check how the sensors of a session are wired.
 
-    Parameters
-    ----------
-    scene, mapping : path, optional
-        By default those of the session, else those of the package.
-    window : TimeWindow
-        Part of the session that is read.
-    with_lags : bool
-        Run the twin over the session, for the lags of the streams.
+    Scene and mapping are by default those of the session, else those of the package. `window` is the part of the session that
+    is read. `with_lags`: the twin runs over the session, for the lags of the streams.
 
-    Raises
-    ------
-    BagError
-        The session cannot be read, is of another boom, or its messages do not name all cylinders.
-    UsageError
-        Scene or mapping have faults.
+    Raise BagError if the session cannot be read, is of another boom, or its messages do not name all cylinders; UsageError if
+    scene or mapping have faults.
     """
     most_lag = 0.08  # s, largest lag that the filter is left to estimate
     session = scan(Path(bag))

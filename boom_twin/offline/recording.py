@@ -69,22 +69,13 @@ class Stretch:
 
 
 class SessionTotals:
-    """Totals of all predictions and residuals of a session; the values themselves are not kept.
-
-    Attributes
-    ----------
-    acceleration : float
-        The largest of the tip, m/s^2.
-    residuals, normalised : ColumnStatistics
-        Of the joints: rad, and over the expected deviations.
-    tip_sigmas : ndarray, shape (2,)
-        Largest standard deviation of the predicted tip's x and y, m; NaN if nothing is known of it.
-    """
+    """Totals of all predictions and residuals of a session; the values themselves are not kept."""
 
     def __init__(self, joints: int) -> None:
-        self.samples, self.acceleration = 0, 0.0
+        self.samples, self.acceleration = 0, 0.0  # predictions; largest acceleration of the tip, m/s^2
+        # of the joints, rad, and over the expected deviations
         self.residuals, self.normalised = ColumnStatistics(joints), ColumnStatistics(joints)
-        self.tip_sigmas: Array = np.full(2, np.nan)
+        self.tip_sigmas: Array = np.full(2, np.nan)  # largest standard deviation of the predicted tip's x and y, m
         self.tip_sigma: float | None = None  # the largest of both together, m
         self.load = TipLoadFinder()  # of the load at the tip that the model does not know
 
@@ -109,17 +100,8 @@ class SessionTotals:
 class Recording:
     """Recording of a replay's results, in the order of the session.
 
-    Parameters
-    ----------
-    take : callable, optional
-        Is given every `Stretch` of the session, which is then let go; without it, the whole session is one, and kept.
-    errors : TipErrors, optional
-        Told of all predictions for which the truth is known.
-
-    Attributes
-    ----------
-    gaps, clock_sets : list of (int, int)
-        Stamps (ns) between which strokes paused; stamps before and after a clock was set.
+    `take` is given every `Stretch` of the session, which is then let go. Without it, the whole session is one, and kept.
+    `errors` is given all predictions for which the truth is known.
     """
 
     def __init__(
@@ -140,8 +122,8 @@ class Recording:
         self._count = self._before = 0  # predictions so far, and those in earlier stretches
         self._rows_by_first_clock: int | None = None
         self._whole: Stretch | None = None
-        self.gaps: list[tuple[int, int]] = []
-        self.clock_sets: list[tuple[int, int]] = []
+        self.gaps: list[tuple[int, int]] = []  # stamps (ns) between which strokes paused
+        self.clock_sets: list[tuple[int, int]] = []  # stamps (ns) before and after a clock was set
         self.refused = 0  # samples that were not used
         self.is_judged = False  # whether the rig's health was
         self.noise: Mapping[str, float] = {}  # see `Health.noise`; the newest
