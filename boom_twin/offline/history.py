@@ -17,7 +17,7 @@ from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..deviation.estimate_row import VARIANCES
 from ..deviation.sensor_model import specific_force
-from ..plots import AlarmSpan, EstimateTrace, History, ImuTrace, Truth, replay_pictures
+from ..plots import AlarmSpan, EstimateTrace, History, ImuTrace, ResidualTrace, Truth, replay_pictures
 from ..plots.history import ExtremeRows
 from ..plots.residuals import SessionDistributionsBuilder, running_mean
 from ..plots.results import SLOW
@@ -125,7 +125,7 @@ class HistoryBuilder:
         tables = {stream: table.columns for stream, table in self._residuals.items() if table.columns}
         return History(
             **{name: found[name] for name in PREDICTED},
-            **_residuals(len(self._scene.joints), tables),
+            residuals=_residuals(len(self._scene.joints), tables),
             imu=ImuTrace(**self._imu.columns) if self._imu.columns else None,
             shapes=self._shapes.kept,
             gaps=[((start - recording.first) * NANO, (end - recording.first) * NANO) for start, end in recording.gaps],
@@ -174,7 +174,7 @@ def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan, residuals: Resi
         joints=predictions.joints,
         cylinder_forces=predictions.cylinder_forces,
         strokes=drives_as_read(plan, predictions.strokes, predictions.cylinder_forces, stretch.reads),
-        **_residuals(stretch.joints, residuals),
+        residuals=_residuals(stretch.joints, residuals),
         imu=_imu(stretch.of(Stream.IMU), stamps, felt, stretch.first),
         shapes=[(float(stamps[row]), outline.shape.copy()) for row, outline in predictions.outlines.items()],
         moments=predictions.moments,
@@ -230,20 +230,14 @@ def _residual_columns(stretch: Stretch) -> Residuals:
     return found
 
 
-def _residuals(joints: int, found: Residuals) -> dict[str, Any]:
-    """Return a history's fields of residuals: one row per stamp and stream; NaN in other streams' columns."""
-    channels = {stream: names for stream, names in channels_of(joints).items() if stream in found}
-    stamps = np.concatenate([np.zeros(0), *(found[stream]["stamps"] for stream in channels)])
-    names = tuple(name for own in channels.values() for name in own)
-    tables = {name: np.full((len(stamps), len(names)), np.nan) for name in RESIDUALS[1:]}
-    row = column = 0
-    for stream, own in channels.items():
-        place = slice(row, row + len(found[stream]["stamps"])), slice(column, column + len(own))
-        for name, table in tables.items():
-            table[place] = found[stream][name]
-        row, column = place[0].stop, place[1].stop
-    given = {f"residual_{name}": table for name, table in tables.items()}
-    return {"residual_stamps_s": stamps, "residual_names": names, **given}
+def _residuals(joints: int, found: Residuals) -> dict[str, ResidualTrace]:
+    """Return the residuals of every channel of the streams found."""
+    return {
+        name: ResidualTrace(found[stream]["stamps"], *(found[stream][column][:, i] for column in RESIDUALS[1:]))
+        for stream, names in channels_of(joints).items()
+        if stream in found
+        for i, name in enumerate(names)
+    }
 
 
 def _imu(force: ResidualRows, stamps: Array, felt: Array, first: int) -> ImuTrace | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .history import AlarmSpan, EstimateTrace, History, ImuTrace, Truth
+from .history import AlarmSpan, EstimateTrace, History, ImuTrace, ResidualTrace, Truth
 from .session import replay_pictures
 
-__all__ = ["AlarmSpan", "EstimateTrace", "History", "ImuTrace", "Truth", "replay_pictures"]
+__all__ = ["AlarmSpan", "EstimateTrace", "History", "ImuTrace", "ResidualTrace", "Truth", "replay_pictures"]

@@ -21,6 +21,16 @@ class ImuTrace:
 
 
 @dataclass(frozen=True)
+class ResidualTrace:
+    """Residuals of one channel, in its unit: measured minus predicted; NaN where it has no sample. Shapes (k,)."""
+
+    stamps_s: Array
+    values: Array
+    sigmas: Array  # expected deviations
+    means: Array  # over a second
+
+
+@dataclass(frozen=True)
 class EstimateTrace:
     """Tip as all sensors see it, at the stamps of the predictions, shape (m, 2); NaN before anything was measured."""
 
@@ -90,7 +100,7 @@ class SessionDistributions:
 
 @dataclass(frozen=True)
 class History:
-    """Everything predicted in a replay of m stroke samples, and k rows of residuals of c channels; n joints.
+    """Everything predicted in a replay of m stroke samples, and the residuals; n joints.
 
     Of a long session, rows are left out between those that hold the extremes, see `ExtremeRows`. Then
     `distributions` are given, which do not follow from the rows that are left.
@@ -103,11 +113,7 @@ class History:
     joints: Array  # (m, n), rad
     cylinder_forces: Array  # (m, n), N, positive in tension
     strokes: Array  # (m, n), m, of the drives
-    residual_stamps_s: Array  # (k,)
-    residual_names: tuple[str, ...]  # `joint_<i>` (rad), `tip_imu_x`, .. (m/s^2)
-    residual_values: Array  # (k, c), measured minus predicted; NaN where a channel has no sample at that stamp
-    residual_sigmas: Array  # (k, c), expected deviations
-    residual_means: Array  # (k, c), over a second
+    residuals: dict[str, ResidualTrace]  # by channel: `joint_<i>` (rad), `tip_imu_x`, .. (m/s^2)
     imu: ImuTrace | None = None
     shapes: list[tuple[float, Array]] = field(default_factory=list)  # deflected centre lines from base to tip, (p, 2), m
     gaps: list[tuple[float, float]] = field(default_factory=list)  # from and to, where strokes were missing

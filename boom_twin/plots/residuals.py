@@ -31,8 +31,8 @@ class SessionDistributionsBuilder:
 
     def add(self, history: History) -> None:
         """Add a part, with all its rows."""
-        for i, name in enumerate(history.residual_names):
-            self._channels.setdefault(name, _Channel()).add(history.residual_values[:, i], history.residual_sigmas[:, i])
+        for name, trace in history.residuals.items():
+            self._channels.setdefault(name, _Channel()).add(trace.values, trace.sigmas)
         imu = history.imu
         if imu is None and self._measured:
             return
@@ -121,28 +121,26 @@ SIGMA = "\N{GREEK SMALL LETTER SIGMA}"
 
 def residual_picture(path: Path, session: str, history: History, note: str) -> None:
     """Write ``residuals.png``."""
-    channels, found = len(history.residual_names), distributions_of(history).residuals
+    channels, found = len(history.residuals), distributions_of(history).residuals
     height = max(9.0, 1.2 + 1.5 * channels)
     with picture(path, f"{session}: residuals, measured minus predicted", note, (16.0, height)) as figure:
         grid = figure.add_gridspec(channels, 2, width_ratios=[5.0, 1.0])
         panels: list[Axes] = []
-        for channel, name in enumerate(history.residual_names):
+        for channel, name in enumerate(history.residuals):
             panels.append(figure.add_subplot(grid[channel, 0], sharex=panels[0] if panels else None))
             panels[-1].tick_params(labelbottom=channel == channels - 1)
-            _channel(panels[-1], history, channel, found[name].reach)
+            _channel(panels[-1], history, name, found[name].reach)
         panels[-1].set_xlabel(TIME)
         legend_above(panels[0], 5, handlelength=1.4, markerscale=4)
-        _distributions(figure.add_subplot(grid[:, 1]), [found[name] for name in history.residual_names])
+        _distributions(figure.add_subplot(grid[:, 1]), [found[name] for name in history.residuals])
 
 
-def _channel(axes: Axes, history: History, channel: int, reach: float) -> None:
+def _channel(axes: Axes, history: History, name: str, reach: float) -> None:
     bins = 1000.0  # of time, in which curves are drawn by their extremes: one and a half pixels each
-    name = history.residual_names[channel]
     factor, unit = sensor_kind(name).shown_unit
-    measured = np.isfinite(history.residual_values[:, channel]) & np.isfinite(history.residual_sigmas[:, channel])
-    stamps = history.residual_stamps_s[measured]
-    values = factor * history.residual_values[measured, channel]
-    sigma = factor * history.residual_sigmas[measured, channel]
+    trace = history.residuals[name]
+    measured = np.isfinite(trace.values) & np.isfinite(trace.sigmas)
+    stamps, values, sigma = trace.stamps_s[measured], factor * trace.values[measured], factor * trace.sigmas[measured]
     shade_gaps(axes, history.gaps)
     shade_alarms(axes, [alarm for alarm in history.alarms if alarm.channel == name])
     narrow = name.replace("cylinder_", "cylinder\n")  # the panel is lower than the name is long
@@ -150,7 +148,7 @@ def _channel(axes: Axes, history: History, channel: int, reach: float) -> None:
     if not stamps.size:
         axes.text(0.5, 0.5, "no samples", transform=axes.transAxes, ha="center", va="center", color=GREY)
         return
-    means, places = factor * history.residual_means[measured, channel], (stamps - stamps[0]) / max(stamps[-1] - stamps[0], 1e-9)
+    means, places = factor * trace.means[measured], (stamps - stamps[0]) / max(stamps[-1] - stamps[0], 1e-9)
     few = extremes((bins * places).astype(np.int64), [sigma, means])
     at, sigma = stamps[few], sigma[few]
     axes.fill_between(at, -3 * sigma, 3 * sigma, color=SKY, alpha=0.22, linewidth=0, label=f"±3 {SIGMA} expected")

@@ -54,7 +54,7 @@ def replay_pictures(
     directory.mkdir(parents=True, exist_ok=True)
     import_plotting()
     tip, residuals, posture, spectrum = (directory / f"{name}.png" for name in ("tip", "residuals", "posture", "spectrum"))
-    is_drawn = {tip: True, residuals: history.residual_names, posture: history.shapes, spectrum: has_spectrum(history)}
+    is_drawn = {tip: True, residuals: history.residuals, posture: history.shapes, spectrum: has_spectrum(history)}
 
     def draw_half() -> None:
         tip_picture(tip, session, history, truth, note)

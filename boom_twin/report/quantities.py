@@ -54,8 +54,8 @@ class QuantityBuilder:
 
     def add(self, history: History, load: Array, variance: Array) -> None:
         """Add the next block of rows; `load` and `variance` as for `SectionLoads.add`."""
-        for name, column in zip(history.residual_names, history.residual_values.T, strict=True):
-            values = column[np.isfinite(column)]
+        for name, trace in history.residuals.items():
+            values = trace.values[np.isfinite(trace.values)]
             means, squares = self._channels.setdefault(name, (BatchMeans(), BatchMeans()))
             means.add(values)
             squares.add(values**2)

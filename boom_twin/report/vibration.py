@@ -146,11 +146,13 @@ def measured_motion(history: History) -> Series:
     """Return the IMU's specific force (m/s^2), or without one the angles (rad)."""
     if history.imu is not None:
         return Series(history.imu.stamps_s, history.imu.measured)
-    places = [i for i, name in enumerate(history.residual_names) if stream_of(name) is Stream.ANGLES]
-    there = np.isfinite(history.residual_values[:, places]).any(axis=1)
-    times, left = history.residual_stamps_s[there], history.residual_values[there][:, places]
-    predicted = [np.interp(times, history.stamps_s, history.joints[:, i]) for i in range(len(places))]
-    return Series(times, left + np.stack(predicted, axis=1) if places else left)
+    angles = [trace for name, trace in history.residuals.items() if stream_of(name) is Stream.ANGLES]
+    if not angles:
+        return Series(np.zeros(0), np.zeros((0, 0)))
+    left = np.column_stack([trace.values for trace in angles])
+    there = np.isfinite(left).any(axis=1)
+    times = angles[0].stamps_s[there]
+    return Series(times, left[there] + np.column_stack([np.interp(times, history.stamps_s, each) for each in history.joints.T]))
 
 
 def _by_mode(found: list[Vibration], model: list[float]) -> dict[int, Vibration]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.plots import History, ImuTrace, replay_pictures
+from boom_twin.plots import History, ImuTrace, ResidualTrace, replay_pictures
 from boom_twin.types import Array
 
 ALL = ["tip.png", "residuals.png", "posture.png", "spectrum.png"]
@@ -30,12 +30,12 @@ def history(joints: int, seconds: float = 12.0, imu: bool = True) -> History:
     steps = 3.0 * np.stack([np.cos(heading), np.sin(heading)], axis=2)
     lines = np.concatenate([np.zeros((len(t), 1, 2)), np.cumsum(steps, axis=1)], axis=1)
     names = tuple(f"joint_{i + 1}" for i in range(joints)) + (("tip_imu_x", "tip_imu_z") if imu else ())
-    sigmas = np.tile(np.where([name.startswith("joint") for name in names], 2e-4, 0.05), (len(t), 1))
+    sigmas = {name: np.full_like(t, 2e-4 if name.startswith("joint") else 0.05) for name in names}
     felt = 40.0 * wave + np.array([-9.0, 2.0])
     return History(
         stamps_s=t, tip_displacement=0.05 * wave - 0.1, tip_position=lines[:, -1], tip_acceleration=40.0 * 0.05 * wave,
-        joints=heading, cylinder_forces=1e4 * heading, strokes=0.1 * heading, residual_stamps_s=t, residual_names=names,
-        residual_values=sigmas * rng.standard_normal(sigmas.shape), residual_sigmas=sigmas, residual_means=0.0 * sigmas,
+        joints=heading, cylinder_forces=1e4 * heading, strokes=0.1 * heading,
+        residuals={name: ResidualTrace(t, each * rng.standard_normal(len(t)), each, 0.0 * t) for name, each in sigmas.items()},
         imu=ImuTrace(t, felt + 0.05 * rng.standard_normal(felt.shape), felt) if imu else None,
         shapes=[(float(t[k]), lines[k]) for k in range(0, len(t), 50)],
     )  # fmt: skip
@@ -61,13 +61,13 @@ def test_all_pictures_are_drawn_and_the_same_bytes_again(tmp_path: Path, joints:
 
 def test_nan_and_gaps_are_survived_and_shown(tmp_path: Path) -> None:
     whole = history(2)
-    t, values = whole.stamps_s, whole.residual_values.copy()
+    t, residuals = whole.stamps_s, {}
     kept = (t < 3.0) | (t > 5.0)
-    values[::2, :2] = np.nan
-    values[:, 2] = np.nan
+    for (name, trace), step in zip(whole.residuals.items(), (2, 2, 1, len(t)), strict=True):
+        residuals[name] = replace(trace, values=np.where(np.arange(len(t)) % step, trace.values, np.nan))
     felt = whole.tip_acceleration.copy()
     felt[100:120] = np.nan
-    holed = replace(whole, tip_acceleration=felt, residual_values=values)
+    holed = replace(whole, tip_acceleration=felt, residuals=residuals)
     names = ("stamps_s", "tip_displacement", "tip_position", "tip_acceleration", "joints", "cylinder_forces", "strokes")
     holed = replace(holed, **{name: getattr(holed, name)[kept] for name in names})
     for gaps in ([], [(3.0, 5.0)]):
@@ -82,9 +82,8 @@ def test_what_is_not_there_has_no_picture(tmp_path: Path) -> None:
     """Less than a spectrum needs, one sample, none, and nothing but strokes."""
     for seconds in (0.1, 0.004):
         assert [path.name for path in replay_pictures(tmp_path, history(1, seconds))] == ALL[:3]
-    one, nothing = history(1, seconds=0.004), np.zeros((0, 0))
+    one = history(1, seconds=0.004)
     none = replace(one, stamps_s=np.zeros(0), tip_displacement=np.zeros((0, 2)), tip_acceleration=np.zeros((0, 2)))
     assert replay_pictures(tmp_path / "none", none) == []
-    told = history(2, imu=False)
-    bare = replace(told, residual_names=(), residual_values=nothing, residual_sigmas=nothing, residual_means=nothing, shapes=[])
+    bare = replace(history(2, imu=False), residuals={}, shapes=[])
     assert [path.name for path in replay_pictures(tmp_path, bare)] == ["tip.png", "spectrum.png"]
