@@ -201,7 +201,6 @@ def _copy(
 
 
 def _copy_session_yaml(path: Path, out: Path) -> None:
-    """Copy ``session.yaml``, whose scene and mapping a replay needs."""
     source = session_yaml(path)
     if holds_file(source) and source.stat().st_size <= LARGEST_FILE:
         with open_received(source) as file:

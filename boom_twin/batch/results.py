@@ -85,11 +85,10 @@ class RigSummary:
 
 def rigs_of(rows: Sequence[Row]) -> list[RigSummary]:
     """Return a summary of each rig with a finished session, sorted by name."""
-    return [_summary(rig, found) for rig, found in _by_rig(rows)]
+    return [_summary(rig, found) for rig, found in _finished_by_rig(rows)]
 
 
-def _by_rig(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
-    """Return the finished sessions of each rig in the order of their begin, sorted by the rig's name."""
+def _finished_by_rig(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
     rigs: dict[str, list[Row]] = {}
     for row in sorted((row for row in rows if row["status"] == OK), key=lambda row: int(row["first_stamp_ns"])):
         rigs.setdefault(row["rig"], []).append(row)
@@ -256,7 +255,6 @@ def _drift_cells(drift: Drift) -> tuple[object, ...]:
 
 
 def _with_unit(name: str) -> str:
-    """Return the name of a figure, with its unit where a channel has one."""
     channel = name.removeprefix("residual_rms_").removeprefix("residual_mean_")
     return name if channel == name else f"{name}, {sensor_kind(channel).unit}"
 
@@ -265,7 +263,7 @@ def _trends(rows: Sequence[Row], summaries: Sequence[RigSummary], folder: Path) 
     """Yield name, drifts and picture in `folder` of wear-related figures over time, for every rig with several sessions."""
     max_trends = 24
     by_name = {rig.rig: rig for rig in summaries}
-    for number, (rig, found) in enumerate(_by_rig(rows)):
+    for number, (rig, found) in enumerate(_finished_by_rig(rows)):
         trends = [trend for name in _figures(found, TRENDS) if len((trend := _trend(name, found)).values) > 1][:max_trends]
         if trends:
             picture = folder / f"{number}.png"

@@ -67,7 +67,7 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: Session
         "counts": [tally.count for tally in tallies],
         "rates_Hz": [tally.rate for tally in tallies],
         "largest_gaps_s": [tally.gap * NANO if tally.gap else None for tally in tallies],
-        "largest_gaps_at_s": [_gap_at(tally, session.start) for tally in tallies],
+        "largest_gaps_at_s": [_gap_begin_s(tally, session.start) for tally in tallies],
         "stamps_not_increasing": [tally.not_increasing for tally in tallies],
         "stamps_unset": [tally.unset for tally in tallies],
         "log_minus_stamp_min_s": [tally.skew and tally.skew.least for tally in tallies],
@@ -84,8 +84,7 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: Session
     }
 
 
-def _gap_at(tally: Tally, start: int) -> float | None:
-    """Return where the largest gap begins, in seconds after the first log time of the session."""
+def _gap_begin_s(tally: Tally, start: int) -> float | None:
     return (tally.gap_after - start) * NANO if tally.gap else None
 
 
@@ -105,7 +104,7 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
         f"scene      {values['scene']}, sha256 {values['scene_sha256'][:12]}.., {len(scene.scene.sections)} sections",
         f"mapping    {values['mapping']}",
         f"strokes    {StrokeReading(values['strokes']).text} ({values['strokes_source']})",
-        f"lasts      {values['duration_s']:.3f} s, {values['messages']} messages{_part(info, values)}",
+        f"lasts      {values['duration_s']:.3f} s, {values['messages']} messages{_part_text(info, values)}",
         "",
         *_table(info),
         "",
@@ -119,8 +118,7 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
     return [printable(line, keep="") for line in lines]
 
 
-def _part(info: BagInfo, values: dict[str, Any]) -> str:
-    """Return in words which part of the session is read; empty if it is all of it."""
+def _part_text(info: BagInfo, values: dict[str, Any]) -> str:
     whole = values["session_duration_s"] == values["duration_s"]
     return "" if whole else f": the part from {info.window.start:g} s on, of {values['session_duration_s']:.3f} s"
 
@@ -129,7 +127,7 @@ def _table(info: BagInfo) -> list[str]:
     late = ["log - stamp, ms: least", "mean", "most"]
     rows = [["topic", "type", "count", "Hz", "gap, ms", "at s", "not rising", "no stamp", *late]]
     for tally in info.tallies:
-        gap = (tally.gap * 1e-6 if tally.gap else None, _gap_at(tally, info.session.start))
+        gap = (tally.gap * 1e-6 if tally.gap else None, _gap_begin_s(tally, info.session.start))
         skew = [value and value * 1e3 for value in tally.skew or (None, None, None)]
         own = [tally.name, tally.type, str(tally.count), _number(tally.rate, 2), _number(gap[0], 2), _number(gap[1], 3)]
         rows.append([*own, str(tally.not_increasing), str(tally.unset), *(_number(value, 3) for value in skew)])

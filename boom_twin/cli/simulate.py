@@ -54,7 +54,7 @@ def run(args: Namespace) -> int:
 
     scene = open_scene(args.scene)
     sources = files_of(args, "drive", "lengths", "force", "scene")
-    check_target(Path(args.out), sources, _is_earlier)
+    check_target(Path(args.out), sources, _holds_simulation)
     times, strokes, stem = read_history(sources[0], len(scene.joints), ("length", "stroke") if args.lengths else ("stroke",))
     pushed = None if args.force is None else _columns(read_csv(Path(args.force), UsageError), FORCE_COLUMNS)
     for oddity in odd_in_drive(times, strokes, stem):
@@ -101,8 +101,7 @@ def as_text(result: Simulation, out: str) -> list[str]:
     return [*lines, out]
 
 
-def _is_earlier(start: bytes) -> bool:
-    """Return True if a file with this beginning holds simulation results, not a drive or session."""
+def _holds_simulation(start: bytes) -> bool:
     names = start.partition(b"\n")[0].decode(errors="replace").split(",")
     is_replay = any(name.startswith("measured_") for name in names)
     return names[0] == "t_s" and not is_replay and any(name.startswith("tip_x_m") for name in names)

@@ -294,7 +294,6 @@ class HealthWatch:
 
 
 def _level_of(alarm: Alarm) -> Level:
-    """Return ERROR for an active alarm with a named cause, else WARN."""
     return Level.WARN if alarm.until is not None or alarm.cause is None else Level.ERROR
 
 

@@ -254,7 +254,7 @@ def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout
         raise BagError(f"{path}: numbers stand in its first line. Write a line above with the names of the columns.")
     units = next((found for _, row in reversed(rows[:first]) if (found := _units(row, numeric))), {})
     above = [row for row in rows[:first] if not _units(row[1], numeric)] or rows[:first]
-    line, names = max(_headers(above), key=lambda header: _recognised(header[1], units))
+    line, names = max(_headers(above), key=lambda header: _recognised_count(header[1], units))
     if sum(place < len(names) and bool(names[place]) for place in numeric) < 2:
         return None
     samples = [row for _, row in rows[first:]]
@@ -277,8 +277,7 @@ def _headers(above: list[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str
         yield line, joined
 
 
-def _recognised(names: list[str], units: Mapping[int, str]) -> int:
-    """Return the number of names recognised as channels or times."""
+def _recognised_count(names: list[str], units: Mapping[int, str]) -> int:
     pairs = [(*split_header(name), place) for place, name in enumerate(names)]
     return sum(is_time(name) or bool(guess(name, unit or units.get(place, ""), None).channel) for name, unit, place in pairs)
 

@@ -178,7 +178,6 @@ class SampleDecoder:
         return found
 
     def _is_of_frame(self, stream: Stream, frame: str) -> bool:
-        """Return True if the mapping expects this ``frame_id``, or any."""
         return frame == (self._frames.get(SENSORS[stream].beside or stream.value) or frame)
 
     def sample_of(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:

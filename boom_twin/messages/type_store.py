@@ -86,7 +86,6 @@ def new_message(type_name: str) -> Any:
 
 @cache
 def _maker(type_name: str) -> Maker:
-    """Return a function that makes a message of `type_name`, built from its definition."""
     store = jazzy()
     kind: Any = store.types[type_name]
     fields = [_field_maker(description) for _, description in store.fielddefs[type_name][1]]

@@ -84,7 +84,7 @@ def _section(robot: Element, scene: Scene, i: int) -> None:
     link = SubElement(robot, "link", name=name)
     _bar(link, (0.0, 0.0), (scene.sections[i].length, 0.0), depth, "section")
     low, high = (math.radians(angle) for angle in scene.joints[i].range_deg)
-    joint = _joint(robot, f"joint_{i + 1}", "revolute", _carrier(i), name, _pivot(scene, i))
+    joint = _joint(robot, f"joint_{i + 1}", "revolute", _carrying_link(i), name, _pivot(scene, i))
     _limit(joint, low, high)
 
 
@@ -95,7 +95,7 @@ def _cylinder(robot: Element, scene: Scene, i: int) -> None:
     eye = 0.1 * closed  # of the rod, outside the barrel
     _tube(SubElement(robot, "link", name=barrel), 0.0, closed - eye, 0.045 * closed, "barrel")
     _tube(SubElement(robot, "link", name=rod), -part.max_stroke - eye, 0.0, 0.025 * closed, "rod")
-    _joint(robot, CYLINDER.format(i + 1), "continuous", _carrier(i), barrel, (pivot[0] + row.cx, pivot[1] + row.cy))
+    _joint(robot, CYLINDER.format(i + 1), "continuous", _carrying_link(i), barrel, (pivot[0] + row.cx, pivot[1] + row.cy))
     stroke = _joint(robot, f"cylinder_{i + 1}", "prismatic", barrel, rod, (closed, 0.0), axis="1 0 0")
     _limit(stroke, 0.0, part.max_stroke)
 
@@ -111,7 +111,7 @@ def _links(robot: Element, scene: Scene, i: int) -> None:
         if carries and row.left:
             for start in (0.0, length):
                 _bar(link, (start, 0.0), (row.along, row.left), side, "link")
-    _joint(robot, LEFT.format(i + 1), "continuous", _carrier(i), left, (pivot[0] + row.dx, pivot[1] + row.dy))
+    _joint(robot, LEFT.format(i + 1), "continuous", _carrying_link(i), left, (pivot[0] + row.dx, pivot[1] + row.dy))
     _joint(robot, RIGHT.format(i + 1), "continuous", f"section_{i + 1}", right, (row.ex, row.ey))
 
 
@@ -128,8 +128,7 @@ def _tip(robot: Element, scene: Scene) -> None:
     _joint(robot, "imu_fixed", "fixed", TIP, IMU, (0.0, 0.0))
 
 
-def _carrier(i: int) -> str:
-    """Return the link that carries joint `i` (0-based)."""
+def _carrying_link(i: int) -> str:
     return f"section_{i}" if i else FRAME
 
 
@@ -170,7 +169,6 @@ def _tube(link: Element, start: float, end: float, radius: float, colour: str) -
 
 
 def _visual(link: Element, middle: tuple[float, float], rpy: str, colour: str) -> Element:
-    """Add a visual and return its empty geometry."""
     visual = SubElement(link, "visual")
     SubElement(visual, "origin", xyz=_xyz(*middle), rpy=rpy)
     geometry = SubElement(visual, "geometry")

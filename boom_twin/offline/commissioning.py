@@ -103,7 +103,7 @@ def commission(
     session = scan(Path(bag))
     own, given = scene_of(session.path, scene), None if mapping is None else Path(mapping)
     joints = len(own.scene.joints)
-    mapped, document = mapping_of(session.path, given, joints), _document(session.path, given)
+    mapped, document = mapping_of(session.path, given, joints), _mapping_content(session.path, given)
     reads = strokes_of(session.path, mapped).reading
     if reads is StrokeReading.ANGLE:
         raise BagError(f"{session.path}: has `drive: angles`. The check needs the strokes of all cylinders; it cannot be made.")
@@ -147,8 +147,7 @@ def commission(
     return Commissioning(found, document, lags, absent)
 
 
-def _document(session: Path, mapping: Path | None) -> dict[str, Any]:
-    """Return the content of the mapping that a session is read with; nothing for the package's own."""
+def _mapping_content(session: Path, mapping: Path | None) -> dict[str, Any]:
     if mapping is not None:
         return dict(read_plain(mapping, UsageError, "Give a file like msg_config/topics.yaml.") or {})
     own = kept(session, "mapping", "--mapping")
@@ -161,7 +160,7 @@ def _mend(document: dict[str, Any], found: Checked) -> None:
         if verdict.is_sure and verdict.best is not None:
             is_turned = verdict.best.turned != verdict.declared.turned
             if not is_turned or verdict.best._replace(turned=verdict.declared.turned) != verdict.declared:
-                mended = "none" if verdict.has_no_gravity else _sensor(verdict.channel, verdict.best)
+                mended = "none" if verdict.has_no_gravity else _unusual_keys(verdict.channel, verdict.best)
                 document.setdefault("sensors", {})[verdict.channel] = mended
             if is_turned:
                 entry = document.setdefault("inputs", {}).setdefault(verdict.stream.value, {})
@@ -169,8 +168,7 @@ def _mend(document: dict[str, Any], found: Checked) -> None:
                 entry["place"] = {**(entry.get("place") or {}), "turned": turned}
 
 
-def _sensor(channel: str, way: Channel) -> dict[str, Any]:
-    """Return the keys of a sensor that differ from the usual ones."""
+def _unusual_keys(channel: str, way: Channel) -> dict[str, Any]:
     least = Sensor(**usual(channel)).model_dump()
     values = way._replace(zero=float(f"{way.zero:.6g}"))._asdict()
     return {key: values[key] for key, value in least.items() if key in values and values[key] != value}
@@ -237,8 +235,8 @@ def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, foun
     raw: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
     left: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
     for block in _samples(session, topics, window, len(twin.mounts)):
-        _collect(raw, block)
-        _collect(left, twin.take(block).residuals)
+        _append_by_stream(raw, block)
+        _append_by_stream(left, twin.take(block).residuals)
     known = {v.stream for v in found.verdicts} - {v.stream for v in found.verdicts if v.is_wrong and not v.is_sure}
     return {each: _lag(raw[each], left[each]) for each in Stream if each in known - UNTIMED and left[each]}
 
@@ -249,8 +247,7 @@ def _samples(session: Session, topics: Topics, window: TimeWindow, joints: int) 
     return (item for item in SessionSamples(session, topics, wanted, joints, window) if isinstance(item, SampleBlock))
 
 
-def _collect(columns: dict[Stream, list[tuple[Array, Array]]], block: SampleBlock | Any) -> None:
-    """Append the rows of every stream: stamps and values."""
+def _append_by_stream(columns: dict[Stream, list[tuple[Array, Array]]], block: SampleBlock | Any) -> None:
     for stream, code in CODES.items():
         own = block.streams == code
         if own.any():

@@ -121,15 +121,14 @@ def replay_inputs(
     streams = tuple(
         stream
         for stream in streams_of(topics.places)
-        if not SENSORS[stream].beside or _has_rates(session, topics.inputs[Stream(SENSORS[stream].beside)], wanted)
+        if not SENSORS[stream].beside or _imu_has_rates(session, topics.inputs[Stream(SENSORS[stream].beside)], wanted)
     )
     return ReplayInputs(
         session, kept, settings, mapped.source, topics, wanted, strokes, streams, options.health, options.window
     )
 
 
-def _has_rates(session: Session, topic: InputTopic, wanted: list[str]) -> bool:
-    """Return True if the first message of an IMU holds a rate."""
+def _imu_has_rates(session: Session, topic: InputTopic, wanted: list[str]) -> bool:
     if topic.name not in wanted:
         return False
     first = next(iter(read(session, {topic.absolute: topic.type})), None)

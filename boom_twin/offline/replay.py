@@ -235,7 +235,7 @@ def replay_into(
         raise BagError(
             f"{session.path}: no {one} sample could be used ({_told(twin)}). "
             f"It needs names {names}_1..{joints}, or those of a mapping, values within {bounds}, "
-            f"and stamps.{_explained(twin.counts)}{_first_refused(given)} {_wiring(given, options)}"
+            f"and stamps.{_explained(twin.counts)}{_first_refused(given)} {_wiring_advice(given, options)}"
         )
     recording.close()
     if recording.totals.samples == 1 < recording.refused:
@@ -267,8 +267,7 @@ def _first_refused(given: ReplayInputs) -> str:
     return ""
 
 
-def _wiring(given: ReplayInputs, options: ReplayOptions) -> str:
-    """Return a sentence on how the strokes of a session are wired, or the remedy for angles."""
+def _wiring_advice(given: ReplayInputs, options: ReplayOptions) -> str:
     if given.strokes.reading is StrokeReading.ANGLE:
         return "Give names, units and zeros of the joints' sensors by --mapping."
     from .commissioning import wiring_of  # only a session without any usable stroke needs it

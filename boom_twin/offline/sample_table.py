@@ -54,7 +54,6 @@ def columns_of(joints: int, streams: Collection[Stream] = USUAL_STREAMS) -> list
 
 
 def _channel_columns(joints: int, streams: Collection[Stream], kind: str) -> dict[Stream, list[str]]:
-    """Return the names of the columns of every stream's channels."""
     return {
         stream: [f"{kind}_{name}_{SENSORS[stream].unit_suffix}" for name in names]
         for stream, names in channels_of(joints, streams).items()
@@ -142,7 +141,7 @@ class SampleTable:
         stamps, rows, residuals = stretch.predictions.stamps, self._new_rows(stretch), stretch.block.residuals
         for part in np.split(np.arange(len(stamps)), np.flatnonzero(np.diff(stamps) <= 0) + 1):
             if len(self._stamps) and stamps[part[0]] <= self._stamps[-1]:
-                self._write(len(self._stamps))
+                self._write_first(len(self._stamps))
                 self._before = NEVER
             self._stamps = np.concatenate([self._stamps, stamps[part]])
             self._rows = np.concatenate([self._rows, rows[part]])
@@ -150,10 +149,10 @@ class SampleTable:
                 self._fill(self._measured, block.streams, block.stamps, block.values)
             self._fill(self._residuals, residuals.streams, residuals.stamps, residuals.values)
         self._ahead = stretch.samples[-2:]  # the rows of a block may come in two stretches
-        self._write(int(np.searchsorted(self._stamps, self._stamps[-1] - round(delay / NANO))))
+        self._write_first(int(np.searchsorted(self._stamps, self._stamps[-1] - round(delay / NANO))))
 
     def finish(self) -> None:
-        self._write(len(self._stamps))
+        self._write_first(len(self._stamps))
 
     def _new_rows(self, stretch: Stretch) -> Array:
         """Return rows with the predicted and estimated values; the rest is NaN."""
@@ -181,8 +180,7 @@ class SampleTable:
                 known = np.isfinite(column)
                 self._rows[row[own][known], first + channel] = column[known]
 
-    def _write(self, count: int) -> None:
-        """Write the first of the waiting rows."""
+    def _write_first(self, count: int) -> None:
         if count:
             self._put(self._rows[:count])
             self._before = int(self._stamps[count - 1])

@@ -15,7 +15,7 @@ def render(template: str, **values: Any) -> str:
     """Return the page that a template makes of `values`. Texts are escaped, except `Markup`."""
     loader = FileSystemLoader(Path(__file__).parent / "templates")
     environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
-    environment.filters |= {"cell": _cell, "data": _data}
+    environment.filters |= {"cell": _cell, "data": _data_address}
     return environment.get_template(template).render(values)
 
 
@@ -28,6 +28,5 @@ def _cell(value: object) -> Markup:
     return Markup("<td>{}</td>").format(value)
 
 
-def _data(path: Path) -> str:
-    """Return a PNG file as the address of an image within the page."""
+def _data_address(path: Path) -> str:
     return f"data:image/png;base64,{b64encode(path.read_bytes()).decode()}"
