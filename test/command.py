@@ -11,7 +11,6 @@ from boom_twin.cli.main import main
 
 
 def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
-    """Return the object that a command prints with ``--json``."""
     capsys.readouterr()
     assert main([*arguments, "--json"]) == 0
     return dict(json.loads(capsys.readouterr().out))

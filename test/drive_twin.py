@@ -20,7 +20,6 @@ ARCH_DRIVES, PUMP_DRIVES = _FOLDER / "arch_session", _FOLDER / "pump_session"
 
 
 def drive_twin(*arguments: Any, **options: Any) -> Twin:
-    """Return a twin that takes its stroke samples for drives."""
     return Twin(*arguments, reads=StrokeReading.DRIVE, **options)
 
 

@@ -79,12 +79,10 @@ def plain(value: Any) -> Any:
 
 
 def hash_of(value: Any) -> str:
-    """Return the SHA-256 of a plain value."""
     return hashlib.sha256(json.dumps(plain(value)).encode()).hexdigest()
 
 
 def number(text: str) -> float | str:
-    """Return the number in a cell of a table, or its text."""
     try:
         return float(text)
     except ValueError:
@@ -148,7 +146,6 @@ def hashes_of_session(session: Path) -> dict[str, str]:
 
 
 def verdict(drawn: int) -> str:
-    """Return the alarms of a drawn session of the health bench as text."""
     row = row_of(drawn)
     alarms = ", ".join(f"{channel} {kind} {since:.2f} s" for channel, kind, _, since, *_ in row["alarms"])
     return f"{' '.join(row['faults']) or 'healthy'}, {' '.join(row['loads']) or 'quiet'}: {alarms or 'no alarm'}"

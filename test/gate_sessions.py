@@ -58,7 +58,6 @@ def write(folder: Path, types: dict[str, str], rows: Iterable[Message], storage:
 
 
 def edited(data: bytes, types: dict[str, str], name: str, edit: Callable[[Any], None]) -> bytes:
-    """Return a message after an edit of its fields."""
     message = TYPES.deserialize_cdr(data, types[name])
     edit(message)
     return bytes(TYPES.serialize_cdr(message, types[name]))

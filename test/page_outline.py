@@ -32,7 +32,6 @@ class Outline(HTMLParser):
 
 
 def outline(page: Path) -> Outline:
-    """Read a page, all of whose tags are closed."""
     found = Outline()
     found.feed(page.read_text(encoding="utf-8"))
     assert found.open == []

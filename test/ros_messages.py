@@ -46,10 +46,8 @@ def imu(x: float, z: float, stamp: int = 0, frame: str = "", covariance: float =
 
 
 def encoded(msg: Any, little_endian: bool = True) -> bytes:
-    """Return a message in CDR."""
     return bytes(jazzy().serialize_cdr(msg, msg.__msgtype__, little_endian=little_endian))
 
 
 def decoded(data: bytes, role: Stream | Output) -> Any:
-    """Return the message of a role from CDR."""
     return jazzy().deserialize_cdr(data, TYPES[role])

@@ -110,7 +110,6 @@ class Rig:
 
 
 def spin_until(node: Any, condition: Callable[[], bool]) -> None:
-    """Let a node's callbacks run until it holds."""
     end = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < end

@@ -47,7 +47,6 @@ def moving(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def bag(tmp_path: Path, arrays: dict[str, Any]) -> Path:
-    """The session as a rosbag2 directory."""
     write_session(tmp_path / "bag", **arrays, description=NOTES)
     return tmp_path / "bag"
 

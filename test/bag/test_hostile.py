@@ -111,7 +111,6 @@ def test_recovery_writes_into_its_folder_alone(bag: Path, tmp_path: Path) -> Non
 
 
 def write_raw(directory: Path, *bodies: bytes) -> Path:
-    """A session of strokes from encoded messages."""
     with MessageWriter(directory, {"strokes": load_topics().inputs[Stream.STROKES]}) as bag:
         for number, body in enumerate(bodies, start=1):
             bag.write_encoded("strokes", number, body)

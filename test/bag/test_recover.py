@@ -36,7 +36,6 @@ def rows(path: Path) -> list[Row]:
 
 
 def is_part_of(some: list[Row], whole: list[Row]) -> bool:
-    """Whether `some` is a subsequence of `whole`."""
     rest = iter(whole)
     return all(row in rest for row in some)
 

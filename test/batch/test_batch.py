@@ -45,7 +45,6 @@ def sessions(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def started(sessions: Path, out: Path) -> subprocess.Popen[str]:
-    """A batch by two workers, at work."""
     command = python_command("boom_twin.cli.main", "batch", str(sessions / "*"), "--out", str(out), "--workers", "2")
     return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 

@@ -23,7 +23,6 @@ def run(code: str, limits: tuple[float, int] = PLENTY, *arguments: str) -> Outco
 
 
 def is_gone(pid: int) -> bool:
-    """Whether a process ends within a minute."""
     for _ in range(600):
         if not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE:
             return True

@@ -63,7 +63,6 @@ Values = dict[str, str]
 
 
 def percent(value: float) -> str:
-    """Return a relative error in words."""
     return f"{100.0 * value:.2g} %"
 
 
@@ -147,7 +146,6 @@ def live(rate: str) -> Callable[[Any], Values]:
 
 
 def lengths(found: dict[str, list[float]]) -> Values:
-    """Read what test/bench/lengths.py leaves."""
     text = "{:.2g} mm, {:.2g} m/s²; {:.2g} mm, {:.2g} m/s²; {:.2g}"
     return {f"lengths: {name}": text.format(*row[:5]) for name, row in found.items()}
 
@@ -160,13 +158,11 @@ def health(found: dict[str, dict[str, int]]) -> Values:
 
 
 def soak(found: dict[str, float]) -> Values:
-    """Read what test/bench/soak.py leaves."""
     sent = f"{found['sent']:,.0f}".replace(",", " ")
     return {"soak": f"{found['lost'] or 'none'} of {sent}; {found['rise_MB']:.1f} MB"} if found["seconds"] > 3500 else {}
 
 
 def live_page(found: dict[str, Any]) -> Values:
-    """Read what test/bench/monitor.py leaves."""
     delays = [int(each) for words in found["said"] for each in re.findall(r"(\d+) ms", words)]
     told = f"{found['frames_per_s']:.0f}; {min(delays)} to {max(delays)} ms" if delays else ""
     return {"page": told} if told and found["seconds"] >= 600 else {}
@@ -179,7 +175,6 @@ BENCHES: dict[str, Callable[[Any], Values]] = {
 
 
 def take(rows: list[dict[str, str]], values: Values, date: object, commit: str) -> None:
-    """Put values into their rows."""
     for row in rows:
         if row["key"] in values:
             row |= {"value": values[row["key"]], "date": str(date), "commit": commit}

@@ -13,7 +13,6 @@ FOLDER = ROOT / "out" / "bench"
 
 
 def git(*words: str) -> str:
-    """Return what a command of git prints about this tree."""
     return subprocess.run(["git", "-C", str(ROOT), *words], check=True, capture_output=True, text=True).stdout.strip()
 
 

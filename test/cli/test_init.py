@@ -19,7 +19,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def table(capsys: pytest.CaptureFixture[str]) -> str:
-    """The example table, which is in table.yaml too."""
     assert main(["init", "--example-table"]) == 0
     text = capsys.readouterr().out
     Path("table.yaml").write_text(text, encoding="utf-8")

@@ -31,13 +31,11 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def made(scene: Path, out: Path, *more: str) -> Path:
-    """The session that the command writes."""
     assert main(["rig", str(scene), "--out", str(out), "--random", "up", "--duration", "3", *more]) == 0
     return out
 
 
 def replayed(scene: Path, bag: Path) -> dict[str, Any]:
-    """The summary of its replay, which lies beside it."""
     assert main(["replay", str(bag), "--scene", str(scene), "--out", f"{bag}_out"]) == 0
     return dict(json.loads(Path(f"{bag}_out", "summary.json").read_text()))
 

@@ -92,7 +92,6 @@ def score(recorded: Path) -> DemoResult:
 
 
 def _messages(session: Session, topic: Topic) -> list[tuple[int, Any]]:
-    """Return log times and messages of one topic; none if it has none."""
     known = session.find(topic.absolute)
     if known is None or known.count == 0:
         return []

@@ -46,7 +46,6 @@ class DemoProcess:
             self._process = subprocess.Popen(command, stdout=file, stderr=file, pass_fds=(lock,))
 
     def output(self) -> str:
-        """Return all output so far."""
         return self._log.read_text(encoding="utf-8")
 
     def check(self) -> None:
@@ -56,7 +55,6 @@ class DemoProcess:
             raise BoomTwinError(f"{self._name} ended with {self._process.returncode}: {last} (see {self._log})")
 
     def end(self) -> None:
-        """Ask the process to end, and wait until it has."""
         end_process(self._process, END_TIMEOUT, self._end_signal)
 
 
@@ -81,12 +79,10 @@ class DemoProcesses:
         self._recorder = self.start("recorder", record, signal.SIGINT)
 
     def start(self, name: str, arguments: list[str], end_signal: signal.Signals) -> DemoProcess:
-        """Start one more process."""
         self._children.append(DemoProcess(arguments, self._beside(f"{name}.log"), end_signal, self._lock))
         return self._children[-1]
 
     def _beside(self, name: str) -> Path:
-        """Return the path of a file of this run."""
         return self.recorded.with_name(f"{self.recorded.name}.{name}")
 
     def check(self) -> None:
@@ -121,7 +117,6 @@ class DemoProcesses:
                 raise BoomTwinError(f"node, recorder and player did not find each other within {PATIENCE:g} s.")
 
     def end(self) -> None:
-        """End all processes, the last first."""
         with ExitStack() as stack:
             for child in self._children:
                 stack.callback(child.end)

@@ -15,7 +15,6 @@ NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 
 
 def quoted(command: str) -> str:
-    """What the page says that a command prints."""
     found = re.search(rf"```\n{re.escape(command)}\n```\n\n```text\n(.*?)\n```", PAGE, re.DOTALL)
     assert found, command
     return found[1]
@@ -30,7 +29,6 @@ def agrees(printed: str, told: str) -> None:
 
 @pytest.fixture
 def table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Path:
-    """The example table in the present folder."""
     monkeypatch.chdir(tmp_path)
     assert main(["init", "--example-table"]) == 0
     path = tmp_path / "boom_table.yaml"

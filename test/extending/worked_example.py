@@ -39,7 +39,6 @@ class WorkedExample:
 
     @property
     def folder(self) -> Path:
-        """Where it lies."""
         return EXAMPLES / self.name
 
     @property
@@ -58,7 +57,6 @@ class WorkedExample:
 
     @property
     def touched(self) -> list[str]:
-        """Files of the package that are new or changed."""
         return sorted({*self.new_files, *TOUCHED.findall(self.patch)})
 
     def apply(self, copy: Path) -> None:

@@ -37,7 +37,6 @@ def predictions(scene: Any) -> list[Prediction]:
 
 
 def drawn(predictions: list[Prediction]) -> list[dict[tuple[str, int], Any]]:
-    """Return the markers of every message, by namespace and id."""
     markers = ShapeMarkers(FACTOR, FULL)
     messages = [decoded(markers.fill(prediction), Output.SHAPE) for prediction in predictions]
     return [{(marker.ns, marker.id): marker for marker in message.markers} for message in messages]

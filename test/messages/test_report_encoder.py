@@ -75,7 +75,6 @@ def encoder() -> ReportEncoder:
 
 
 def filled(report: Report) -> dict[Output, Any]:
-    """Return the decoded messages of one report."""
     return {key: decoded(data, key) for key, data in encoder().fill(report)}
 
 

@@ -45,12 +45,10 @@ def spoil(path: Path) -> None:
 
 @pytest.fixture(scope="session")
 def feed(faulty: Path, made_once: MadeOnce) -> Feed:
-    """Return that session through the twin."""
     return made_once.value("faulty_feed", lambda: read_all(bag_feed(faulty, load_scene(), Settings())))
 
 
 def read_all(feed: BagFeed) -> BagFeed:
-    """Read a session to its end."""
     feed.poll()
     while feed.is_reading:
         feed.poll()

@@ -30,7 +30,6 @@ TABS = ("traces", "spectrum", "shape", "state", "path")
 
 @pytest.fixture(scope="module")
 def monitor(faulty: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[MonitorProcess]:
-    """Provide the page of the faulty session."""
     with monitoring(tmp_path_factory.mktemp("monitor") / "log", "--bag", str(faulty)) as process:
         yield process
 
@@ -83,7 +82,6 @@ def cells(page: Any, selector: str) -> list[list[str]]:
 
 
 def is_drawn(page: Any, canvas: str) -> bool:
-    """Return True if anything but one colour is on a canvas."""
     pixels = "c.getContext('2d').getImageData(0, 0, c.width, c.height).data.buffer"
     script = f"id => {{ const c = document.querySelector(id); return new Set(new Uint32Array({pixels})).size }}"
     return bool(page.evaluate(script, canvas) > 3)

@@ -71,7 +71,6 @@ def vector(role: Role, x: float = 0.5) -> Any:
 
 
 def uncertain(role: Role, variance: float) -> Any:
-    """An estimate whose x has that variance."""
     message = vector(role)
     holder = message.pose if role is Output.ESTIMATE_POSE else message.accel
     holder.covariance[0] = variance

@@ -54,7 +54,6 @@ class Made(Feed):
 
 
 def serve(feed: Feed, talk: Talk, permitted: tuple[str, ...] = (), access: AccessControl | None = None) -> None:
-    """Run `talk` with a session and the address of a server of `feed`."""
     asyncio.run(_serve(Server(feed, ViewerActions(feed, frozenset(permitted)), access or AccessControl("127.0.0.1")), talk))
 
 

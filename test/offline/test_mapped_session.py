@@ -31,7 +31,6 @@ sensors:
 
 @pytest.fixture(scope="module")
 def arrays():
-    """Stamps, strokes and angles of the first seconds of the bundled session."""
     return tuple(each[:ROWS] for each in rows_in(SESSION, 4.0)[:3])
 
 

@@ -88,7 +88,6 @@ def test_stray_stamps_are_dropped_and_told(tmp_path):
 
 
 def content_of(folder):
-    """Bytes by path of all files."""
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 

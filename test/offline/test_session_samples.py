@@ -89,7 +89,6 @@ class Rig:
         return float(self._random.normal())
 
     def stamp(self, log: int) -> tuple[int, int]:
-        """Seconds and nanoseconds."""
         odd = [(0, 0), (-1, 5), (2**31 - 1, 4 * 10**9), (5, 2**32 - 1)]
         return self.any_of(odd) if self.chance(self._odd) else divmod(log - 1234, 10**9)
 

@@ -48,7 +48,6 @@ def write(folder: Path, found: list[Sample], logs: list[int] | None = None) -> P
 
 
 def replayed(folder: Path) -> dict[str, Any]:
-    """The summary of a replay by the command line."""
     assert main(["replay", str(folder), "--out", str(folder) + "_out", "--report"]) == 0
     return dict(json.loads((Path(str(folder) + "_out") / "summary.json").read_text()))
 

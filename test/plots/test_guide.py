@@ -34,14 +34,12 @@ NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
 
 @pytest.fixture
 def boom(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The guide's file in a folder of its own, which is the present one."""
     monkeypatch.chdir(tmp_path)
     Path("my_boom.yaml").write_text(WHOLE, encoding="utf-8")
     return Path("my_boom.yaml")
 
 
 def quoted(command: str) -> str:
-    """What the guide says that a command prints."""
     found = re.search(rf"```\n{re.escape(command)}\n```\n\n```text\n(.*?)\n```", GUIDE, re.DOTALL)
     assert found, f"the guide does not quote `{command}`"
     return found[1]

@@ -28,15 +28,12 @@ def write_sessions(folder: Path) -> None:
 
 @pytest.fixture(scope="session")
 def sessions(made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Healthy, and faulty."""
     folder = made_once.folder("report_sessions", write_sessions, tmp_path_factory.mktemp("sessions"))
     return folder / "healthy", folder / "faulty"
 
 
 @pytest.fixture(scope="session")
 def replays(sessions: tuple[Path, Path], made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Of both, with report."""
-
     def make(folder: Path) -> None:
         for each in sessions:
             assert main(["replay", str(each), "--out", str(folder / each.name), "--report", "--fatigue", "80"]) == 0

@@ -28,7 +28,6 @@ def swing(frequency: float, damping: float, size: float, phase: float = 0.3) -> 
 
 
 def measured(seed: int) -> Array:
-    """Two modes in two channels."""
     random = np.random.default_rng(seed)
     first, second = swing(1.05, 0.008, 1.0), swing(2.4, 0.02, 0.3, 1.0)
     return np.stack([0.4 * first + second, first - 0.5 * second], axis=1) + random.normal(9.0, 0.05, (len(TIMES), 2))

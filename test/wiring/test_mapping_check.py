@@ -23,8 +23,6 @@ SECONDS = "24"
 
 
 class Rows(NamedTuple):
-    """A bundled session at 50 Hz."""
-
     stamps: np.ndarray
     strokes: np.ndarray
     joints: np.ndarray
