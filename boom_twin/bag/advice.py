@@ -222,7 +222,7 @@ def _counted(number: int, kind: str) -> str:
 
 def _names_read(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[str, None]]:
     """Return the names in messages of strokes and angles, read for 5 s and until all driving sensors are named."""
-    heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.heard.items()}
+    heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.streams_by_topic.items()}
     present = {name: streams for name, streams in heard.items() if streams and session.count(name)}
     if not present:
         return {}

@@ -78,7 +78,7 @@ def _wanted(session: Session, topics: Topics) -> list[str]:
         found = session.find(topic.name)
         if stream is Stream.STROKES:
             check_topic(session, topic.name, topic.type)
-        if stream is Stream.STROKES or (found is not None and found.count and topic.name in topics.heard):
+        if stream is Stream.STROKES or (found is not None and found.count and topic.name in topics.streams_by_topic):
             names.append(topic.name)
     return list(dict.fromkeys(names))
 

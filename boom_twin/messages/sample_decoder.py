@@ -75,7 +75,7 @@ class _Channels:
         self._topics, self._stream = topics, stream
         self._known: dict[tuple[str, ...], _Named] = {}
 
-    def look(self, names: tuple[str, ...]) -> _Named:
+    def among(self, names: tuple[str, ...]) -> _Named:
         """Return the channels among `names`."""
         kept = 16  # lists of names remembered for one stream: a bus may send every joint in a message of its own
         if names not in self._known:
@@ -160,7 +160,7 @@ class SampleDecoder:
                     continue
                 is_regular = not is_absent.any()
             else:
-                places, *_, is_regular = channels.look(names)
+                places, *_, is_regular = channels.among(names)
                 is_regular &= len(columns) == len(names)
             is_regular &= self._is_of_frame(stream, frame)
             own = [i for i, place in enumerate(places) if place >= 0]
@@ -214,7 +214,7 @@ class SampleDecoder:
         """Return places of the channels among `end` readings (-1 without one), what is odd, and if all sensors are named."""
         if len(names) > MOST_NAMES:
             return None, ["too many names"], True
-        places, twice, lacking, beyond, is_regular = self._channels[stream].look(tuple(names))
+        places, twice, lacking, beyond, is_regular = self._channels[stream].among(tuple(names))
         if is_regular and end == len(names):
             return places, [], True
         other = self._sharing.get(stream)
@@ -225,7 +225,7 @@ class SampleDecoder:
             self._note_strange(stream, names, lacking)
         odd = ["name twice"] if twice else []
         if max(places) < 0 and not odd:
-            is_unknown = other is None or max(self._channels[other].look(tuple(names)).places) < 0
+            is_unknown = other is None or max(self._channels[other].among(tuple(names)).places) < 0
             return None, ["unknown names only"] if is_unknown else [], True
         if end != len(names):
             odd.append("unequal arrays")

@@ -173,8 +173,8 @@ class Topics(_Entry):
         return strokes is not None and strokes.absolute == self.inputs[Stream.ANGLES].absolute
 
     @property
-    def heard(self) -> dict[str, list[Stream]]:
-        """Streams of every input topic by its name; strokes first."""
+    def streams_by_topic(self) -> dict[str, list[Stream]]:
+        """Streams of every input topic; strokes first."""
         found: dict[str, list[Stream]] = {}
         pressures = [Stream.PRESSURES] if self.areas else []
         for stream in [*streams_of(self.places), *pressures]:

@@ -191,7 +191,7 @@ def readings_of(session: Session, topics: Topics, joints: int, window: TimeWindo
 
     Names that the mapping does not have are taken if it names a sensor that is in no message.
     """
-    heard = {name: streams for name, streams in topics.heard.items() if (topic := session.find(name)) and topic.count}
+    heard = {name: streams for name, streams in topics.streams_by_topic.items() if session.count(name)}
     types = {name: topics.inputs[streams[0]].type for name, streams in heard.items()}
     columns: dict[tuple[Stream, str], tuple[list[Integers], list[Array]]] = defaultdict(lambda: ([], []))
     blocks = read_blocks(session, types, window)
@@ -243,7 +243,7 @@ def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, foun
 
 def _samples(session: Session, topics: Topics, window: TimeWindow, joints: int) -> Iterator[SampleBlock]:
     """Yield the samples of a session, without changes that a node made."""
-    wanted = [name for name in topics.heard if (topic := session.find(name)) is not None and topic.count]
+    wanted = [name for name in topics.streams_by_topic if session.count(name)]
     return (item for item in SessionSamples(session, topics, wanted, joints, window) if isinstance(item, SampleBlock))
 
 

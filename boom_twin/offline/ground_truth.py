@@ -115,6 +115,6 @@ def truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list[
 
 def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], window: TimeWindow) -> int:
     """Return the stamp of the first message of strokes in a window, ns; 0 if there is none."""
-    types = {name: topics.inputs[topics.heard[name][0]].type for name in wanted}
+    types = {name: topics.inputs[topics.streams_by_topic[name][0]].type for name in wanted}
     messages, drive = read(session, types, window), topics.stroke_reading.stream
-    return next((stamp_of(message) for name, _, message in messages if drive in topics.heard[name]), 0)
+    return next((stamp_of(message) for name, _, message in messages if drive in topics.streams_by_topic[name]), 0)

@@ -175,7 +175,7 @@ def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan, residuals: Resi
         cylinder_forces=predictions.cylinder_forces,
         strokes=drives_as_read(plan, predictions.strokes, predictions.cylinder_forces, stretch.reads),
         residuals=_residuals(stretch.joints, residuals),
-        imu=_imu(stretch.of(Stream.IMU), stamps, felt, stretch.first),
+        imu=_imu(stretch.residuals_of(Stream.IMU), stamps, felt, stretch.first),
         shapes=[(float(stamps[row]), outline.shape.copy()) for row, outline in predictions.outlines.items()],
         moments=predictions.moments,
         slow_moments=running_mean(stamps, predictions.moments, SLOW),
@@ -223,7 +223,7 @@ def _residual_columns(stretch: Stretch) -> Residuals:
     """Return the columns `RESIDUALS` of all streams that have any: stamps (k,) in s, else shape (k, channels)."""
     found = {}
     for stream in Stream:
-        if len((rows := stretch.of(stream)).stamps):
+        if len((rows := stretch.residuals_of(stream)).stamps):
             stamps = _seconds(rows.stamps, stretch.first)
             columns = stamps, rows.values, rows.sigmas, _running_means(stamps, rows.values)
             found[stream] = dict(zip(RESIDUALS, columns, strict=True))

@@ -115,7 +115,7 @@ def replay_inputs(
     if not topics.areas and session.count(topics.inputs[Stream.PRESSURES].name):
         raise UsageError(f"{session.path}: {NO_AREAS}")
     drive = topics.stroke_reading.stream
-    wanted = [name for name, streams in topics.heard.items() if drive in streams or session.count(name)]
+    wanted = [name for name, streams in topics.streams_by_topic.items() if drive in streams or session.count(name)]
     strokes = strokes_of(session.path, mapped)
     refuse_conflicts(session, topics, len(joints), kept.source)
     streams = tuple(

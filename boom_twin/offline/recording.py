@@ -61,7 +61,7 @@ class Stretch:
         """Estimates beside the predictions."""
         return self.block.estimates
 
-    def of(self, stream: Stream) -> ResidualRows:
+    def residuals_of(self, stream: Stream) -> ResidualRows:
         """Return the residuals of one stream."""
         rows, names = self.block.residuals, channels_of(self.joints)[stream]
         own = rows.streams == CODES[stream]
@@ -80,7 +80,7 @@ class SessionTotals:
         self.load = TipLoadFinder()  # of the load at the tip that the model does not know
 
     def add(self, stretch: Stretch) -> None:
-        angles, predictions = stretch.of(Stream.ANGLES), stretch.predictions
+        angles, predictions = stretch.residuals_of(Stream.ANGLES), stretch.predictions
         self.residuals.add(angles.values)
         self.normalised.add(angles.normalised)
         for health in stretch.health:

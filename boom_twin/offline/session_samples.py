@@ -90,7 +90,7 @@ class SessionSamples:
         read.
         """
         batch = 400  # messages in one block, at least
-        heard, session = self._topics.heard, self._session
+        heard, session = self._topics.streams_by_topic, self._session
         changes = recorded_changes(session, self._topics)
         types = {name: self._topics.inputs[heard[name][0]].type for name in self._wanted}
         blocks, count = read_blocks(session, types, self._window), 0

@@ -84,7 +84,7 @@ def test_a_replay_repeats_the_changes_of_its_session(tmp_path: Path) -> None:
             if stamp == told.stamp:
                 bag.write_encoded("c", stamp + 1_000_000, encode_changes(told))
     result = replay(tmp_path / "bag", scene, tmp_path / "out")
-    predictions, residuals = result.recording.whole.predictions, result.recording.whole.of(Stream.ANGLES)
+    predictions, residuals = result.recording.whole.predictions, result.recording.whole.residuals_of(Stream.ANGLES)
     assert predictions.tip_position[49, 1] - predictions.tip_position[50, 1] > 0.01
     assert residuals.values[49, 0] - residuals.values[50, 0] > 0.015
     events = json.loads((tmp_path / "out" / "summary.json").read_text())["events"]

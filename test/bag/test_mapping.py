@@ -42,7 +42,7 @@ def write(tmp_path: Path) -> Any:
 def test_what_is_left_out_is_as_usual(write: Any) -> None:
     topics, usual = load_mapping(write(EXAMPLE), 3), load_topics()
     shared = [Stream.STROKES, Stream.ANGLES]
-    assert topics.heard == {
+    assert topics.streams_by_topic == {
         "/rig/joint_states": shared,
         "tip_imu": [Stream.IMU, Stream.RATE],
         "cylinder_forces": [Stream.FORCES],

@@ -89,15 +89,15 @@ def test_a_mapping_places_them_and_their_messages_are_read(tmp_path: Path) -> No
     )
     topics = load_mapping(path, 4)
     assert topics.places == {"imu_2": Place(2, 3.1, 0.5)}
-    assert topics.heard["/mid/imu"] == [Stream.IMU_2, Stream.RATE_2]
+    assert topics.streams_by_topic["/mid/imu"] == [Stream.IMU_2, Stream.RATE_2]
     msg = new_message("sensor_msgs/msg/Imu")
     msg.header.stamp.sec = 5
     msg.linear_acceleration.x, msg.linear_acceleration.z, msg.angular_velocity.y = 1.0, 9.0, -2.0
     decoder = SampleDecoder(4, topics)
-    force, rate = decoder.samples(topics.heard["/mid/imu"], 5 * 10**9, msg)
+    force, rate = decoder.samples(topics.streams_by_topic["/mid/imu"], 5 * 10**9, msg)
     assert force.values.tolist() == [1.0, 9.0] and rate.values == pytest.approx([math.radians(2.0)])
     msg.angular_velocity_covariance[0] = -1.0
-    assert [each.stream for each in decoder.samples(topics.heard["/mid/imu"], 6 * 10**9, msg)] == [Stream.IMU_2]
+    assert [each.stream for each in decoder.samples(topics.streams_by_topic["/mid/imu"], 6 * 10**9, msg)] == [Stream.IMU_2]
     assert not decoder.oddities
 
 
@@ -159,9 +159,9 @@ def test_messages_are_read_by_the_mapping(tmp_path: Path) -> None:
     point, gauge = new_message("geometry_msgs/msg/PointStamped"), new_message("sensor_msgs/msg/JointState")
     point.header.stamp.sec = gauge.header.stamp.sec = 5
     point.point.x, point.point.z, gauge.name, gauge.effort = 7.0, 2.0, ["gauge_b", "moment_1"], np.array([-3.0, 1.0])
-    (found,) = decoder.samples(topics.heard["/station/prism"], 5 * 10**9, point)
+    (found,) = decoder.samples(topics.streams_by_topic["/station/prism"], 5 * 10**9, point)
     assert (found.stream, found.values.tolist()) == (Stream.POINT, [7.0, 2.0])
-    (found,) = decoder.samples(topics.heard["section_moments"], 5 * 10**9, gauge)
+    (found,) = decoder.samples(topics.streams_by_topic["section_moments"], 5 * 10**9, gauge)
     assert found.stream is Stream.MOMENTS and found.values[1] == -3000.0 and np.isnan(found.values[[0, 2, 3]]).all()
     assert not decoder.oddities
 

@@ -84,7 +84,7 @@ def mapped(tmp_path: Path, text: str, scene: Scene = SCENE) -> Topics:
 
 def test_they_become_forces_positive_in_tension(tmp_path: Path) -> None:
     topics = mapped(tmp_path, MAPPING)
-    assert topics.heard["cylinder_pressures"] == [Stream.PRESSURES]
+    assert topics.streams_by_topic["cylinder_pressures"] == [Stream.PRESSURES]
     cap, rod = np.array([2e6, 3e6, 0.0, 150e5]), np.array([1e6, 0.0, 40e5, 10e5])
     msg = new_message("sensor_msgs/msg/JointState")
     msg.header.stamp.sec = 5
@@ -92,13 +92,13 @@ def test_they_become_forces_positive_in_tension(tmp_path: Path) -> None:
     msg.effort = np.concatenate([cap, rod])
     msg.effort[1] = 30.0  # bar
     decoder = SampleDecoder(4, topics)
-    (sample,) = decoder.samples(topics.heard["cylinder_pressures"], 5 * 10**9, msg)
+    (sample,) = decoder.samples(topics.streams_by_topic["cylinder_pressures"], 5 * 10**9, msg)
     assert sample.stream is Stream.FORCES
     assert sample.values == pytest.approx(rod * RING - cap * PISTON, rel=1e-12)
     assert sample.values[2] > 0.0 > sample.values[1], "the rod side pulls"
     assert not decoder.oddities
     msg.name = msg.name[:7]  # without the rod side of the last
-    (sample,) = decoder.samples(topics.heard["cylinder_pressures"], 6 * 10**9, msg) or list(decoder.assembler.rest())
+    (sample,) = decoder.samples(topics.streams_by_topic["cylinder_pressures"], 6 * 10**9, msg) or list(decoder.assembler.rest())
     assert np.isnan(sample.values).tolist() == [False, False, False, True]
 
 

@@ -239,7 +239,7 @@ def test_messages_of_another_frame_are_left_out_and_counted(frame_id: str, taken
     topics = mapping_from({"inputs": {"imu_2": {"place": {"section": 2}, "frame_id": "boom_2"}}}, "mapping", 2)
     decoder, msg = SampleDecoder(2, topics), new_message("sensor_msgs/msg/Imu")
     msg.header.frame_id, msg.linear_acceleration.z = frame_id, 9.8
-    assert len(decoder.samples(topics.heard["imu_2"], 10**9, msg)) == taken
+    assert len(decoder.samples(topics.streams_by_topic["imu_2"], 10**9, msg)) == taken
     assert decoder.oddities["another frame"] == decoder.refused == (not taken)
 
 

@@ -15,7 +15,7 @@ def assert_same_bytes(session: Path, out: Path, topics: Topics, reads: StrokeRea
     """The first messages of the result bag are those of the three calls, as bytes: neither blocks nor threads change them."""
     scene, store = load_scene(), jazzy()
     live, decoder, encoder = Twin(scene, health=True, reads=reads), SampleDecoder(4, topics), ReportEncoder(scene, Settings())
-    heard = {topics.inputs[streams[0]].absolute: streams for streams in topics.heard.values()}
+    heard = {topics.inputs[streams[0]].absolute: streams for streams in topics.streams_by_topic.values()}
     types = {name: topics.inputs[streams[0]].type for name, streams in heard.items() if scan(session).find(name)}
     expected: list[tuple[str, bytes]] = []
     for name, _, msg in read(scan(session), types):

@@ -55,7 +55,7 @@ def test_residuals_are_what_is_expected(first):
     is_length = summary["strokes"] == "length"  # drives tell nothing of loads: what is stated holds those that may come
     assert np.all((spread > (0.85 if is_length else 0.0)) & (spread < 1.15))
     assert np.all(np.abs(summary["joint_residual_normalised_mean"]) < 0.3)
-    sigmas = recording.whole.of(Stream.ANGLES).sigmas
+    sigmas = recording.whole.residuals_of(Stream.ANGLES).sigmas
     assert np.all(sigmas >= SENSOR) and (np.all(sigmas <= 2 * SENSOR) or not is_length)
 
 

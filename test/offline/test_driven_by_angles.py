@@ -51,7 +51,7 @@ def test_the_tip_follows_the_truth(without_strokes, mapping, tmp_path):
     times = (estimates.stamps - estimates.stamps[0]) * 1e-9 + truth.times[0]
     off = estimates.tip[:, :2] - truth.at(times, truth.position)
     assert 0.6 < np.sqrt(np.mean(off**2 / estimates.tip_covariance[:, [0, 3]])) < 2.0
-    assert found.recording.whole.of(Stream.STROKES).values.size == 0
+    assert found.recording.whole.residuals_of(Stream.STROKES).values.size == 0
 
 
 def test_a_replay_gives_what_the_node_does(without_strokes, mapping, tmp_path):
@@ -101,4 +101,4 @@ def test_an_imu_elsewhere_goes_with_angles(tmp_path):
     mapping.write_text("drive: angles\ninputs: {imu_2: {place: {}}}\n")
     found = replay(folder, None, tmp_path / "out", mapping=mapping)
     assert found.summary["tip_estimate_acceleration_error_rms_m_s2"] < 0.1 and found.summary["alarms"] == []
-    assert np.nanstd(found.recording.whole.of(Stream.IMU_2).values) > 0.0
+    assert np.nanstd(found.recording.whole.residuals_of(Stream.IMU_2).values) > 0.0

@@ -76,7 +76,7 @@ def test_a_recording_is_replayed_with_its_own_mapping(rig, usual, tmp_path):
     assert one.stamps.tolist() == other.stamps.tolist()
     np.testing.assert_allclose(one.tip_position, other.tip_position, atol=1e-9)
     np.testing.assert_allclose(one.tip_acceleration, other.tip_acceleration, atol=1e-5)
-    expected, angles = usual.recording.whole.of(Stream.ANGLES), found.recording.whole.of(Stream.ANGLES)
+    expected, angles = usual.recording.whole.residuals_of(Stream.ANGLES), found.recording.whole.residuals_of(Stream.ANGLES)
     assert len(angles.stamps) == ROWS // EVERY
     rows = np.searchsorted(expected.stamps, angles.stamps)
     assert expected.stamps[rows].tolist() == angles.stamps.tolist()

@@ -92,7 +92,7 @@ def test_rows_are_what_was_predicted_measured_and_estimated(tmp_path: Path, monk
     for i in range(6):
         assert told[f"estimate_mode_{i + 1}_m"] == pytest.approx(estimates.modes[:, i], rel=1e-8, nan_ok=True)
         assert told[f"estimate_mode_{i + 1}_m_s"] == pytest.approx(estimates.mode_rates[:, i], rel=1e-8, nan_ok=True)
-    innovations = found.whole.of(Stream.STROKES)
+    innovations = found.whole.residuals_of(Stream.STROKES)
     assert np.isnan(told["residual_cylinder_2_m"][0]) and len(innovations.stamps) == len(predictions.stamps) - 1
     assert told["residual_cylinder_2_m"][1:] == pytest.approx(innovations.values[:, 1], rel=1e-8)
     given = samples()
@@ -106,7 +106,7 @@ def test_rows_are_what_was_predicted_measured_and_estimated(tmp_path: Path, monk
         assert told[f"measured_joint_{i + 1}_rad"] == pytest.approx(expected[:, i], rel=1e-8, nan_ok=True)
         known = np.isfinite(told[f"residual_joint_{i + 1}_rad"])
         assert known.sum() >= 0.98 * np.isfinite(expected[:, i]).sum() and not (known & np.isnan(expected[:, i])).any()
-    rows = found.whole.of(Stream.IMU)
+    rows = found.whole.residuals_of(Stream.IMU)
     assert told["residual_tip_imu_z_m_s2"][np.isin(predictions.stamps, rows.stamps)] == pytest.approx(
         rows.values[:, 1], rel=1e-8
     )

@@ -148,7 +148,10 @@ class Expected:
         self.found: Found = []
         self.without = [0]
         self.error = ""
-        self._decoder, self._heard = SampleDecoder(JOINTS, topics), {f"/{k.lstrip('/')}": v for k, v in topics.heard.items()}
+        self._decoder, self._heard = (
+            SampleDecoder(JOINTS, topics),
+            {f"/{k.lstrip('/')}": v for k, v in topics.streams_by_topic.items()},
+        )
         sorted_files = [sorted(entries, key=itemgetter(0)) for entries in files]
         entries = [(*entry, number) for number, file in enumerate(sorted_files) for entry in file]
         entries.sort(key=itemgetter(0))
@@ -182,7 +185,7 @@ def plain(sample: Sample) -> tuple[Any, ...]:
 
 def compare(folder: Path, topics: Topics, expected: Expected) -> None:
     """That the session in `folder` is read as expected."""
-    wanted = list(topics.heard)
+    wanted = list(topics.streams_by_topic)
     found: Found = []
     without, error = [0], ""
     try:
