@@ -9,7 +9,8 @@ from .states import ALL_VALVES, BURST, OPEN, PREDICTION, VALVES, whole
 
 MODELS = BURST + 1  # of a mixture
 LEAST_CHANCE = 1e-60  # of a model, so that none is 0: the rates let it grow again, but for a load while a valve is open
-OPENS, CLOSES = 0.3, 1.0  # 1/s, rates at which valves open, and are closed again
+OPENS, CLOSES = 1.0, 1.0  # 1/s, rates at which valves open, and are closed again
+MEMORY = 0.5  # s, of openings of valves, see `interact`; none where angles drive the model, for a load hardly changes these
 COMES, STAYS = 0.2, 1.0  # 1/s, rates at which a load comes while all valves are closed, and is usual again
 
 
@@ -29,10 +30,14 @@ def first_model(mixture):
 
 
 @inner
-def interact(f, mixture, size, h):
+def interact(f, mixture, size, h, memory):
     """Mix the models of a mixture before a step of `h` (s), by the rates at which valves and load change.
 
     No sudden load is expected while a valve is open: another that opens explains the same lengths, and is far likelier.
+
+    That a valve has opened shows only after some tenths of a second. Until then the models of closed valves take the motion
+    for a load. So the model of open valves stands for all openings within `memory` (s) and keeps the state of the earliest: of
+    the state of closed valves it takes a share of h / `memory` at most.
     """
     first, switch, coming = first_model(mixture), f.switch, COMES
     for i in range(f.is_open.shape[1]):
@@ -49,6 +54,10 @@ def interact(f, mixture, size, h):
             f.likely[target] += f.chances[first + source] * switch[source, target]
         for source in range(MODELS):
             f.shares[target, source] = f.chances[first + source] * switch[source, target] / f.likely[target]
+    kept = min(h / max(memory * (1.0 - f.shares[OPEN, OPEN]), 1e-300), 1.0)
+    f.shares[OPEN, VALVES] *= kept
+    f.shares[OPEN, BURST] *= kept
+    f.shares[OPEN, OPEN] = 1.0 - f.shares[OPEN, VALVES] - f.shares[OPEN, BURST]
     two, three = apart(f, first, size)
     one, other, last, shares, width = f.p[first], f.p[first + 1], f.p[first + 2], f.shares, whole(size)
     for i in range(size):

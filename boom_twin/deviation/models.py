@@ -39,7 +39,7 @@ from .kalman import (
     transit,
 )
 from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
-from .mixture import MODELS, copy_model, first_model, interact, mix, weigh_models
+from .mixture import MEMORY, MODELS, copy_model, first_model, interact, mix, weigh_models
 from .rows import SWAY_SHARE, column_row, drive_row, reach2, read, variance_of
 from .states import (
     ALL_BURST,
@@ -66,8 +66,12 @@ MOST_EXCESS = 1e6  # times the variance that a channel is stated to have
 
 
 @kernel
-def start_models(p, f, speed, swing):
-    """Start at rest at the drives of the posture. Drives may move at `speed` (m/s), the tip may vibrate by `swing` (m)."""
+def start_models(p, f, speed, swing, at_work):
+    """Start at rest at the drives of the posture.
+
+    With all valves open, drives may move at `speed` (m/s) and the tip may vibrate by `swing` (m). If the boom is `at_work`, all
+    models allow for that.
+    """
     n, m, size = p.drives.shape[0], p.modes[0], all_states(p)
     load, drive = force_place(p), drive_place(p)
     noise, x, covariance = f.noise, f.x[VALVES], f.p[VALVES]
@@ -78,22 +82,20 @@ def start_models(p, f, speed, swing):
         covariance[load + 2 + a, load + 2 + a] = noise.first_load * noise.first_load
         covariance[load + 4 + a, load + 4 + a] = f.load2[0, a] / (FAST * FAST)
     for j in range(m):
-        motion2 = reach2(p, 2 + n + j)
         omega2 = p.omega[j] * p.omega[j]
-        off2 = 0.1 * motion2 * f.load2[0, 0] / (omega2 * omega2)
-        if j == 0 and motion2 > 0.0:
-            off2 += swing * swing / motion2
-        for i in range(n):
-            off2 += (p.forces[2 + n + j, i] * speed) ** 2 / (omega2 * omega2 * omega2)
+        off2 = 0.1 * reach2(p, 2 + n + j) * f.load2[0, 0] / (omega2 * omega2)
         covariance[j, j], covariance[m + j, m + j] = off2, omega2 * off2
     for i in range(n):
         x[drive + i] = p.drives[i]
         covariance[drive + i, drive + i] = f.noise.length2 * first_scale(p, i)
-        covariance[drive + n + i, drive + n + i] = CLOSED_RATE * CLOSED_RATE + speed * speed
-        f.jerk[i], f.is_open[PREDICTION, i], f.still[PREDICTION, i] = JERK, 1 if speed > 0.0 else 0, 0.0
+        covariance[drive + n + i, drive + n + i] = CLOSED_RATE * CLOSED_RATE
+        f.jerk[i], f.is_open[PREDICTION, i], f.still[PREDICTION, i] = JERK, 1 if at_work else 0, 0.0
         f.length2[i], f.pulls[i] = noise.length2, p.pulled[i]
         f.before[i, 0] = f.before[i, 1] = f.before[i, 2] = math.nan
     copy_model(f, VALVES, OPEN, size)
+    add_motion(p, f.p[OPEN], speed, swing)
+    if at_work:
+        copy_model(f, OPEN, VALVES, size)
     copy_model(f, VALVES, BURST, size)
     f.chances[VALVES], f.chances[OPEN], f.chances[BURST] = 0.8, 0.1, 0.1
     f.excess[:], f.ratio[:], f.shaking[:] = 1.0, 1.0, 0.0
@@ -101,6 +103,22 @@ def start_models(p, f, speed, swing):
     mix(f, PREDICTION, zero_place(p))
     take_prediction(p, f, 1.0)
     f.status[FED] = 0
+
+
+@inner
+def add_motion(p, covariance, speed, swing):
+    """Add the variances of drives that may move at `speed` (m/s), and of a tip that may vibrate by `swing` (m)."""
+    n, m, drive = p.drives.shape[0], p.modes[0], drive_place(p)
+    for j in range(m):
+        omega2, off2 = p.omega[j] * p.omega[j], 0.0
+        if j == 0:
+            off2 = swing * swing / max(reach2(p, 2 + n), 1e-9)
+        for i in range(n):
+            off2 += (p.forces[2 + n + j, i] * speed) ** 2 / (omega2 * omega2 * omega2)
+        covariance[j, j] += off2
+        covariance[m + j, m + j] += omega2 * off2
+    for i in range(n):
+        covariance[drive + n + i, drive + n + i] += speed * speed
 
 
 @inner
@@ -120,7 +138,7 @@ def step_models(p, f, h, y):
     if h > 0.0:
         steps = max(1, math.ceil(h / LONGEST_STEP - 1e-6))
         for mixture in range(mixtures):
-            interact(f, mixture, states_of(p, mixture), h)
+            interact(f, mixture, states_of(p, mixture), h, 0.0 if p.reads_angle else MEMORY)
         make_transition(p, f, h / steps)
         for mixture in range(mixtures):
             first, states = first_model(mixture), states_of(p, mixture)

@@ -56,6 +56,8 @@ class Posture(NamedTuple):
     read, pulled : (2 n + 3 sites,), (n,) angles to forces at rest.
     omega, decay : (m,) rad/s and 2 zeta omega, 1/s. compliance, lag : (n,) 1/k (m/N; 0 if rigid) and d/k (s).
     oil_read : (n,) the compliance where stroke transducers read lengths, 0 where they read drives (`reads_drive`).
+    drive_read : (n,) change of such a reading by its drive at a constant force N, m/m: 1 + N d(1/k)/dd, for a longer column of
+    oil is softer; 1 where drives are read.
     reads_angle : whether the model is driven by angles. tilt : (n,) angle of the base, for inclinometers. gravity : (2,) m/s^2.
     slope, curvature : (n,) change of a joint's angle by its stroke, rad/m, and of that, rad/m^2.
     frames, absolute, sways : (n,) of angle sensors, see `Mounting`. roots : (n + 1,)
@@ -83,6 +85,7 @@ class Posture(NamedTuple):
     compliance: Array
     lag: Array
     oil_read: Array
+    drive_read: Array
     reads_drive: bool
     reads_angle: bool
     tilt: Array
@@ -133,7 +136,8 @@ def new_posture(
         forces=np.zeros((columns, n)), moments=np.zeros((columns, len(measured.bending))),
         read=np.zeros(width), pulled=np.zeros(n), omega=np.zeros(most),
         decay=np.zeros(most), compliance=np.zeros(n), lag=np.zeros(n),
-        oil_read=np.zeros(n), reads_drive=reads is StrokeReading.DRIVE, reads_angle=reads is StrokeReading.ANGLE,
+        oil_read=np.zeros(n), drive_read=np.ones(n), reads_drive=reads is StrokeReading.DRIVE,
+        reads_angle=reads is StrokeReading.ANGLE,
         tilt=np.where(mounting.absolute, inclination, 0.0), gravity=np.array(plan.tables.gravity), slope=np.zeros(n),
         curvature=np.zeros(n), frames=mounting.frames.astype(np.int64), absolute=mounting.absolute, sways=mounting.sways,
         roots=roots.astype(np.int64), masses=plan.masses, points=np.array(list(_mass_points(plan))),
@@ -195,10 +199,13 @@ def linearise(t, boom, work, p, drives, follow):
     for i in range(p.position.shape[0]):
         p.position[i] = work.position[i]
     for i in range(n):
-        cylinder = t.cylinders[i]
+        cylinder, drive = t.cylinders[i], p.closed[i] + drives[i]
         p.pulled[i] = boom.z[cylinder.z]
-        p.compliance[i], p.lag[i] = compliance_and_lag(cylinder, t.oils, p.closed[i] + drives[i])
-        p.oil_read[i] = 0.0 if p.reads_drive else p.compliance[i]
+        p.compliance[i], p.lag[i] = compliance_and_lag(cylinder, t.oils, drive)
+        if not p.reads_drive:
+            longer, _ = compliance_and_lag(cylinder, t.oils, drive + DRIVE_SIZE)
+            shorter, _ = compliance_and_lag(cylinder, t.oils, drive - DRIVE_SIZE)
+            p.oil_read[i], p.drive_read[i] = p.compliance[i], 1.0 + p.pulled[i] * (longer - shorter) / (2.0 * DRIVE_SIZE)
     note_linkages(t, p)
     respond_statically(t, boom, work, p)
     if follow:

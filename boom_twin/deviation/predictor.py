@@ -182,7 +182,7 @@ class BoomPredictor:
             raise SolverError(SENTENCES[int(status)])
         self._free_gauges()
         sag = float(np.hypot(*(boom.frames[-1, :2] - self._undeflected.at(angles)[-1])))
-        start_models(p, f, SPEED if may_move else 0.0, SWING * sag if may_move else 0.0)
+        start_models(p, f, SPEED, SWING * sag, may_move)
         return readings
 
     def _free_gauges(self) -> None:

@@ -100,7 +100,7 @@ def column_row(p, columns, at, scale, row):
 def length_row(p, i, row):
     """Write the row of the stroke transducer of cylinder `i`: its drive, and the oil's compression by the elastic force."""
     column_row(p, p.forces, i, p.oil_read[i], row)
-    row[drive_place(p) + i] += 1.0
+    row[drive_place(p) + i] += p.drive_read[i]
 
 
 @inner

@@ -190,7 +190,7 @@ def move_sites(t, live, p, f, h, gravity):
 def stroke_rate(p, f, i):
     """Return the rate of what the stroke transducer of cylinder `i` reads, m/s."""
     n, m, drive = p.drives.shape[0], p.modes[0], drive_place(p)
-    rate = f.mean[PREDICTION, drive + n + i]
+    rate = p.drive_read[i] * f.mean[PREDICTION, drive + n + i]
     for k in range(n):
         rate += p.oil_read[i] * p.forces[2 + k, i] * f.mean[PREDICTION, drive + n + k]
     for j in range(m):

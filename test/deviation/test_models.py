@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
+
 import numpy as np
 import pytest
 from default_boom import EXACT, strokes_of_posture
 from scipy.linalg import expm
 
-from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
+from boom_twin import Sample, Scene, Settings, Stream, Twin, load_scene, statics
 from boom_twin.deviation.kalman import DRIVE_TIME, FAST, SLOW, correct, make_transition, transit
 from boom_twin.deviation.learning import learnt
 from boom_twin.deviation.mixture import CLOSES, COMES, OPENS, STAYS, first_model, interact, mix
@@ -21,6 +23,7 @@ SCENE = load_scene()
 DRIVES = strokes_of_posture(SCENE, "arch")
 REST = statics(SCENE, DRIVES)
 N, STEP = len(DRIVES), 5_000_000
+Z_FOLD = files("boom_twin") / "examples" / "five_section_z_fold.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -118,8 +121,8 @@ def test_probabilities_of_models_are_those_of_a_markov_chain(mixture: int, boom:
     first = first_model.py_func(mixture)
     rates = np.array([[-OPENS - COMES, OPENS, COMES], [CLOSES, -CLOSES, 0.0], [STAYS, OPENS, -STAYS - OPENS]])
     before = np.array([0.5, 0.3, 0.2])
-    f.chances[first : first + 3] = before
-    interact.py_func(f, mixture, 7, h)
+    f.chances[first : first + 3], f.is_open[:] = before, 0
+    interact.py_func(f, mixture, 7, h, 0.5)
     assert f.chances[first : first + 3] == pytest.approx(before @ expm(h * rates), abs=2e-6)
     assert f.chances[first : first + 3].sum() == pytest.approx(1.0)
     boom.start(REST.lengths)
@@ -131,15 +134,19 @@ def test_a_usual_load_is_learnt_up_to_one_that_has_just_come(boom: BoomPredictor
     assert learnt.py_func(f, most, 4.0 * most, 0.1) == most
 
 
-def test_length_row_is_the_compression_of_the_oil(boom: BoomPredictor) -> None:
-    # length = drive + c F: the length that statics has at another drive
-    p, step, drive = boom.posture, 1e-5, 2 * int(boom.posture.modes[0]) + LOADS
-    for i in range(N):
-        row = np.zeros(boom.filters.x.shape[1])
+@pytest.mark.parametrize("scene", [SCENE, load_scene(Z_FOLD)], ids=["k", "oil"])
+def test_length_row_is_the_compression_of_the_oil(scene: Scene) -> None:
+    """length = drive + c F: the length that statics has at another drive; c of a column of oil follows the drive."""
+    found, step = BoomPredictor(scene, Settings()), 1e-5
+    found.start(statics(scene, "arch").lengths)
+    p, n, drives = found.posture, len(scene.joints), statics(scene, "arch").strokes
+    drive = 2 * int(p.modes[0]) + LOADS
+    for i in range(n):
+        row = np.zeros(found.filters.x.shape[1])
         length_row.py_func(p, i, row)
-        for k in range(N):
-            change = step * np.eye(N)[k]
-            lengths = statics(SCENE, DRIVES + change).lengths - statics(SCENE, DRIVES - change).lengths
+        for k in range(n):
+            change = step * np.eye(n)[k]
+            lengths = statics(scene, drives + change).lengths - statics(scene, drives - change).lengths
             assert row[drive + k] == pytest.approx(lengths[i] / (2.0 * step), rel=1e-5, abs=1e-6)
 
 
