@@ -200,19 +200,17 @@ def stroke_rate(p, f, i):
 
 @inner
 def write_ways(boom, live, work, p, f):
-    """Write the accelerations of the pivots beyond those of a boom that moves little about rest, and their modal forces.
+    """Write the accelerations that the curved ways of the pivots need at constant rates, and the modal forces of all such ways.
 
-    With the turning rate w_i of the chord r_i of section i (s_i at rest), its angular acceleration b_i by the rows about rest,
-    and what w_i changes by the geometry of the linkages, a_i, a place has in addition the acceleration
+    With the turning rate w_i of the chord r_i of section i, and what w_i changes by the geometry of the linkages, a_i, a
+    place has the acceleration c = sum_i (a_i e_z x r_i - w_i^2 r_i). The chord of its own section ends there. So masses m whose
+    motion in mode j is s_j give the equation of that mode the force - sum m s_j . c.
 
-        c = sum_i (a_i e_z x r_i - w_i^2 r_i + b_i e_z x (r_i - s_i)).
-
-    The chord of its own section ends there. So masses m whose motion in mode j is s_j give the equation of that mode the force
-    - sum m s_j . c.
+    The rows have angular accelerations b_i act on the chords at rest, q_i. A place has sum_i b_i e_z x (r_i - q_i) in addition.
     """
     n, m, drive, change = p.drives.shape[0], p.modes[0], drive_place(p), 0.0
     chords = site_column(p, p.sites.shape[0])
-    f.swing[:], f.ways[0, 0], f.ways[0, 1] = 0.0, 0.0, 0.0
+    f.swing[:], f.ways[0] = 0.0, 0.0
     for i in range(n):
         rate, v = 0.0, f.mean[PREDICTION, drive + n + i]
         for k in range(n):
@@ -220,36 +218,44 @@ def write_ways(boom, live, work, p, f):
         for j in range(m):
             rate += p.readings[2 + n + j, chords + i] * f.mean[PREDICTION, m + j]
         change += p.curvature[i] * v * v
+        f.ways[i, 2], f.ways[i, 3] = rate, change
+        end = live.frames[p.roots[i + 1]]
+        f.ways[i + 1, 0], f.ways[i + 1, 1] = bend_at(live, p, f, i, end[FRAME_X], end[FRAME_Y])
         acceleration_row(p, chords + i, f.row)
-        f.ways[i, 2], f.ways[i, 3], f.ways[i, 4] = rate, change, read(f.row, f.mean[PREDICTION], zero_place(p))
-        end, rest = live.frames[p.roots[i + 1]], boom.frames[p.roots[i + 1]]
-        f.ways[i + 1, 0], f.ways[i + 1, 1] = bend_at(
-            boom, live, p, f, i, end[FRAME_X], end[FRAME_Y], rest[FRAME_X], rest[FRAME_Y]
+        f.ways[i, 4], rest = read(f.row, f.mean[PREDICTION], zero_place(p)), boom.frames[p.roots[i + 1]]
+        f.ways[i + 1, 5], f.ways[i + 1, 6] = turned_at(
+            boom, live, p, f, i, end[FRAME_X] - rest[FRAME_X], end[FRAME_Y] - rest[FRAME_Y]
         )
     for k in range(p.points.shape[0]):
         at, section = p.points[k]
-        x, y = bend_at(boom, live, p, f, section, work.position[at], work.position[at + 1], p.position[at], p.position[at + 1])
+        x, y = bend_at(live, p, f, section, work.position[at], work.position[at + 1])
         for j in range(m):
             f.swing[j] -= p.masses[at] * p.motions[j, at] * x + p.masses[at + 1] * p.motions[j, at + 1] * y
 
 
 @inner
-def bend_at(boom, live, p, f, section, x, y, rest_x, rest_y):
-    """Return the acceleration, m/s^2, that a place of a section, given also at rest, has by its curved way."""
-    root, rest = live.frames[p.roots[section]], boom.frames[p.roots[section]]
-    way = f.ways[section]
-    rate2, change, turn = way[2] * way[2], way[3], way[4]
+def bend_at(live, p, f, section, x, y):
+    """Return the acceleration, m/s^2, that the curved way of a place of a section needs."""
+    root, rate, change = live.frames[p.roots[section]], f.ways[section, 2], f.ways[section, 3]
     x, y = x - root[FRAME_X], y - root[FRAME_Y]
-    off_x, off_y = x - (rest_x - rest[FRAME_X]), y - (rest_y - rest[FRAME_Y])
-    return way[0] - rate2 * x - change * y - turn * off_y, way[1] + change * x - rate2 * y + turn * off_x
+    return f.ways[section, 0] - rate * rate * x - change * y, f.ways[section, 1] + change * x - rate * rate * y
+
+
+@inner
+def turned_at(boom, live, p, f, section, off_x, off_y):
+    """Return the acceleration, m/s^2, of a place of a section off its place at rest, by angular accelerations about rest."""
+    root, rest, turn = live.frames[p.roots[section]], boom.frames[p.roots[section]], f.ways[section, 4]
+    off_x, off_y = off_x - (root[FRAME_X] - rest[FRAME_X]), off_y - (root[FRAME_Y] - rest[FRAME_Y])
+    return f.ways[section, 5] - turn * off_y, f.ways[section, 6] + turn * off_x
 
 
 @inner
 def write_bend(boom, live, p, f, k, motion):
-    """Write the acceleration (x, y, angle) of site `k` by its curved way, and by the modal forces of all such ways."""
-    at = site_column(p, k)
-    rest_x, rest_y = p.read[at], p.read[at + 1]
-    motion[6], motion[7] = bend_at(boom, live, p, f, p.sites[k].section, motion[0], motion[1], rest_x, rest_y)
+    """Write what the acceleration (x, y, angle) of site `k` has beyond that about rest, and by the modal forces of ways."""
+    at, section = site_column(p, k), p.sites[k].section
+    x, y = bend_at(live, p, f, section, motion[0], motion[1])
+    turned_x, turned_y = turned_at(boom, live, p, f, section, motion[0] - p.read[at], motion[1] - p.read[at + 1])
+    motion[6], motion[7] = x + turned_x, y + turned_y
     motion[8] = f.ways[p.sites[k].section, 3]
     for j in range(p.modes[0]):
         for a in range(3):

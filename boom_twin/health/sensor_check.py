@@ -91,8 +91,7 @@ class SensorFindings(NamedTuple):
 class StreamReadings(NamedTuple):
     """A block of k readings.
 
-    means : (3, channels) of readings that the model has something to compare with, of the expected ones, and of the expected
-    variances of the differences of these; NaN of none.
+    means : (3, channels) of readings with a prediction, of these, of the variances of their differences; NaN of none.
     is_bent : True if trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by
     second and by third differences, motion much less by third ones.
     """

@@ -226,8 +226,7 @@ def summarise(sensors, stamps, raw, left, sigmas, masked, share):
                 variance += sigmas[t, i] * sigmas[t, i]
         means[:, i] = math.nan
         if known > 0:
-            variance /= known
-            means[0, i], means[1, i] = read / known, (read - off) / known
+            means[0, i], means[1, i], variance = read / known, (read - off) / known, variance / known
             means[2, i] = max(variance - sensors.stated, 0.0) + sensors.stated / known  # the mean has less noise
         rate = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span if span > 0.0 else math.nan
         if masked[i]:
