@@ -204,14 +204,16 @@ class FaultSearch:
     def _name(self, place: int, begin: int, chances: Sequence[tuple[str, float]], stamp: int) -> list[Alarm]:
         """Name the fault of a verdict (see `Verdict`), or end it if it is named; return its alarm.
 
-        A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show.
+        A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show. One whose
+        joint has a sensor that is off is not: its stroke transducer may be that, and k is known by what this reads.
         """
         fault = self._faults[place]
         if fault in self._named:
             return self._ended(fault, begin)
         if fault.cause.startswith("cylinder_") and fault.kind == "softer":
-            creeps = int(fault.channel.removeprefix("cylinder_")) - 1 in self._creep.creeping
-            if creeps or stamp - begin < SPAN * SECOND:
+            number = int(fault.channel.removeprefix("cylinder_"))
+            is_off = any(each.cause == f"joint_{number}.sensor" for each in self._named)
+            if is_off or number - 1 in self._creep.creeping or stamp - begin < SPAN * SECOND:
                 return []
         if (found := self._sized(fault, begin)) is None:
             self._decision.discard(place)

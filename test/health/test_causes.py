@@ -262,6 +262,21 @@ def test_a_zero_is_told_once_it_hardly_drifts():
     assert size > 6e3 and abs(1e4 - size) < 2.5 * spread < 6e3
 
 
+@pytest.mark.parametrize("joint", [1, 2])
+def test_a_spring_is_no_cause_where_its_stroke_transducer_may_be_off(joint):
+    """Spring 2 looks 25 % softer from second 30 on, after a sensor of a joint has been named in second 15."""
+
+    def made(each):
+        def rate(second):
+            return 30.0 * (f"joint_{joint}" in twin.doubted) - 400.0 * (spring_of(each) - 0.25 * (second >= 30)) ** 2
+
+        twin = Zeroed(rate, 1e-3, 1e-5, 10, 99, each.doubted)
+        return twin
+
+    named = [alarm.cause for alarm in taken(FaultTwins(load_scene(), made, SETTINGS), 60)]
+    assert named == [f"joint_{joint}.sensor", *["cylinder_2.k"] * (joint == 1)]
+
+
 def test_a_named_sensor_leaves_all_twins_running():
     """The boom does not change by it: the twins go on, all doubt the sensor, and no more once it reads right again."""
     made = []
