@@ -25,14 +25,13 @@ from ..scene.kinematics import RigidJoints
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading, channels_of, streams_of
-from .channels import DRIFT_FIRST, LAG_FIRST, READS_ACCELERATION, READS_FORCE, READS_MOMENT, TIP_IMU_STATES, measurement_of
+from .channels import DRIFT_FIRST, LAG_FIRST, READS_FORCE, READS_MOMENT, TIP_IMU_STATES, measurement_of
 from .estimate_row import MODES
 from .kalman import FORCE_ZERO
 from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .rest_at_readings import RestFinder
 from .sensor_model import mounting_of
-from .sensors import INEXACT
 from .states import DOUBTS, ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
@@ -252,22 +251,21 @@ class BoomPredictor:
         self.filters.drift[:] = 1.0
         self.filters.drift[self._zeros_of(channels)] = DOUBTED_DRIFT
 
-    def zeros(self, channels: Collection[str]) -> tuple[Array, Array]:
-        """Return the estimated zeros of these sensors, in their units, and their variances, in the order of the states.
+    def zeros(self, channels: Collection[str]) -> tuple[Array, Array, Array]:
+        """Return the estimated zeros of these sensors, in their units, their variances, and deviations by errors of the scene.
 
-        The variances are at given mount and scale of the tip IMU, which do not change. What the model has wrong of an
-        acceleration, or of a force by errors of the scene, looks like a zero, and is in its variance.
+        They are in the order of the states. The variances are at given mount and scale of the tip IMU, which do not change.
+        Errors of the scene look like a zero of a force: as a share of the force, which is the same at all times.
         """
         f, first, places = self.filters, zero_place(self.posture), self._zeros_of(channels)
         covariance, at, fixed = f.spread[ESTIMATE], first + np.array(places), first + np.array([2, 3])
         shared = covariance[np.ix_(at, fixed)]
         variances = covariance[at, at] - (shared @ np.linalg.pinv(covariance[np.ix_(fixed, fixed)]) * shared).sum(axis=1)
+        errors = np.zeros(len(places))
         for row in self.posture.channels:
-            if row.kind == READS_ACCELERATION and row.zero in places:
-                variances[places.index(row.zero)] += INEXACT**2 * f.shaking[row.site, 0]
-            elif row.kind == READS_FORCE and row.zero in places:
-                variances[places.index(row.zero)] += (f.noise.scene_error * f.pulls[row.index]) ** 2
-        return f.mean[ESTIMATE, at], variances
+            if row.kind == READS_FORCE and row.zero in places:
+                errors[places.index(row.zero)] = f.noise.scene_error * f.pulls[row.index]
+        return f.mean[ESTIMATE, at], variances, errors
 
     @property
     def clocks(self) -> dict[Stream, Clock]:

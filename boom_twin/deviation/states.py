@@ -55,10 +55,11 @@ class Filters(NamedTuple):
     copies : (c,) places of late channels among the copies of one instant, -1 of others. instants : (DELAYED,) stamps of copies,
     see `delayed`. taken : (streams,) stamps of the newest samples that corrected the estimate, ns. curves : (c, 3) expected
     readings, their rates, and mean squares of their second derivatives.
-    bends : (sites, 2) accelerations that the curved ways of sites need, m/s^2. ways : (n + 1, 4) those of pivots and tip,
-    rates (rad/s) and angular accelerations (rad/s^2) of the chords behind them. swing : (m,) modal forces by these,
-    inputs : (2 m,) changes of modal coordinates and rates in a step by them. sway2 : (n,) square of the largest angle by
-    which an inclinometer lately erred, rad^2.
+    bends : (sites, 2) accelerations that sites have by their curved ways, m/s^2. ways : (n + 1, 7) those of pivots and tip (2),
+    rates (rad/s), angular accelerations by linkages, and about rest (rad/s^2) of the chords behind them, accelerations that
+    pivots and tip have by these off their places at rest (2). swing : (m,) modal
+    forces by these, inputs : (2 m,) changes of modal coordinates and rates in a step by them. sway2 : (n,) square of the
+    largest angle by which an inclinometer lately erred, rad^2.
     modal, transition : (m, 6), (p, p) part of the modes in the transition matrix, and its transpose. variances : (s,) of its
     noise.
     motion : (sites, 9) predicted x, y, angle of every site, m and rad, their rates, their accelerations.
@@ -136,7 +137,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         still=np.zeros((2, n)), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
-        ways=np.zeros((n + 1, 4)), swing=np.zeros(modes), inputs=np.zeros(2 * modes),
+        ways=np.zeros((n + 1, 7)), swing=np.zeros(modes), inputs=np.zeros(2 * modes),
         sway2=np.zeros(n), apart=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,
         late=np.zeros(len(Stream)), taken=np.zeros(len(Stream), np.int64), curves=np.zeros((channels, 3)),
         copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),

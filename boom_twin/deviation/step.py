@@ -75,8 +75,8 @@ def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
     if not is_finite(p, f):
         return NOT_FINITE
     place_live(t, boom, live, work, p, f)
-    write_ways(live, work, p, f)
-    write_prediction(t, live, p, f, h, gravity, out)
+    write_ways(boom, live, work, p, f)
+    write_prediction(t, boom, live, p, f, h, gravity, out)
     return OK
 
 
@@ -117,7 +117,7 @@ def add_column(p, z, k, size):
 
 
 @inner
-def write_prediction(t, live, p, f, h, gravity, out):
+def write_prediction(t, boom, live, p, f, h, gravity, out):
     """Write results and estimates; see `kernels.result_row`."""
     n, size, pins = p.drives.shape[0], zero_place(p), t.clearances.shape[0]
     found, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
@@ -138,7 +138,7 @@ def write_prediction(t, live, p, f, h, gravity, out):
         row = t.clearances[k]
         found.pins[k, 0], found.pins[k, 1] = live.z[row.z], live.z[row.z + 1]
         found.pins[k, 2], found.pins[k, 3] = 0.0, 1.0
-    move_sites(t, live, p, f, h, gravity)
+    move_sites(t, boom, live, p, f, h, gravity)
     for k in range(3):
         for a in range(3):
             found.tip[k, a] = f.motion[0, 3 * k + a]
@@ -161,13 +161,13 @@ def write_driving_angles(p, f, estimates):
 
 
 @inner
-def move_sites(t, live, p, f, h, gravity):
+def move_sites(t, boom, live, p, f, h, gravity):
     """Write the predicted motion of all sites, how much they shake, and what accelerometers read there."""
     size = zero_place(p)
     for k in range(p.sites.shape[0]):
         motion, at = f.motion[k], site_column(p, k)
         motion[0], motion[1], motion[2] = locate(t, live, p, k)
-        write_bend(live, p, f, k, motion)
+        write_bend(boom, live, p, f, k, motion)
         f.bends[k, 0], f.bends[k, 1] = motion[6], motion[7]
         for a in range(3):
             rate_row(p, at + a, f.row)
@@ -199,16 +199,18 @@ def stroke_rate(p, f, i):
 
 
 @inner
-def write_ways(live, work, p, f):
+def write_ways(boom, live, work, p, f):
     """Write the accelerations that the curved ways of the pivots need at constant rates, and the modal forces of all such ways.
 
     With the turning rate w_i of the chord r_i of section i, and what w_i changes by the geometry of the linkages, a_i, a
     place has the acceleration c = sum_i (a_i e_z x r_i - w_i^2 r_i). The chord of its own section ends there. So masses m whose
     motion in mode j is s_j give the equation of that mode the force - sum m s_j . c.
+
+    The rows have angular accelerations b_i act on the chords at rest, q_i. A place has sum_i b_i e_z x (r_i - q_i) in addition.
     """
     n, m, drive, change = p.drives.shape[0], p.modes[0], drive_place(p), 0.0
     chords = site_column(p, p.sites.shape[0])
-    f.swing[:], f.ways[0, 0], f.ways[0, 1] = 0.0, 0.0, 0.0
+    f.swing[:], f.ways[0] = 0.0, 0.0
     for i in range(n):
         rate, v = 0.0, f.mean[PREDICTION, drive + n + i]
         for k in range(n):
@@ -219,6 +221,11 @@ def write_ways(live, work, p, f):
         f.ways[i, 2], f.ways[i, 3] = rate, change
         end = live.frames[p.roots[i + 1]]
         f.ways[i + 1, 0], f.ways[i + 1, 1] = bend_at(live, p, f, i, end[FRAME_X], end[FRAME_Y])
+        acceleration_row(p, chords + i, f.row)
+        f.ways[i, 4], rest = read(f.row, f.mean[PREDICTION], zero_place(p)), boom.frames[p.roots[i + 1]]
+        f.ways[i + 1, 5], f.ways[i + 1, 6] = turned_at(
+            boom, live, p, f, i, end[FRAME_X] - rest[FRAME_X], end[FRAME_Y] - rest[FRAME_Y]
+        )
     for k in range(p.points.shape[0]):
         at, section = p.points[k]
         x, y = bend_at(live, p, f, section, work.position[at], work.position[at + 1])
@@ -235,13 +242,24 @@ def bend_at(live, p, f, section, x, y):
 
 
 @inner
-def write_bend(live, p, f, k, motion):
-    """Write the acceleration (x, y, angle) of site `k` by its curved way, and by the modal forces of all such ways."""
-    motion[6], motion[7] = bend_at(live, p, f, p.sites[k].section, motion[0], motion[1])
+def turned_at(boom, live, p, f, section, off_x, off_y):
+    """Return the acceleration, m/s^2, of a place of a section off its place at rest, by angular accelerations about rest."""
+    root, rest, turn = live.frames[p.roots[section]], boom.frames[p.roots[section]], f.ways[section, 4]
+    off_x, off_y = off_x - (root[FRAME_X] - rest[FRAME_X]), off_y - (root[FRAME_Y] - rest[FRAME_Y])
+    return f.ways[section, 5] - turn * off_y, f.ways[section, 6] + turn * off_x
+
+
+@inner
+def write_bend(boom, live, p, f, k, motion):
+    """Write what the acceleration (x, y, angle) of site `k` has beyond that about rest, and by the modal forces of ways."""
+    at, section = site_column(p, k), p.sites[k].section
+    x, y = bend_at(live, p, f, section, motion[0], motion[1])
+    turned_x, turned_y = turned_at(boom, live, p, f, section, motion[0] - p.read[at], motion[1] - p.read[at + 1])
+    motion[6], motion[7] = x + turned_x, y + turned_y
     motion[8] = f.ways[p.sites[k].section, 3]
     for j in range(p.modes[0]):
         for a in range(3):
-            motion[6 + a] += p.readings[2 + p.drives.shape[0] + j, site_column(p, k) + a] * f.swing[j]
+            motion[6 + a] += p.readings[2 + p.drives.shape[0] + j, at + a] * f.swing[j]
 
 
 @inner

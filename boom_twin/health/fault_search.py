@@ -28,6 +28,7 @@ from .sensor_check import Flags
 
 RATIO = 1.4  # of successive trial sizes of a named fault
 IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
+DELAY = 2  # s from the end of a second to its verdict
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
 WARM_UP = 10  # s of recent samples that new twins take first: they know neither motion nor zeros when they start
 
@@ -50,8 +51,8 @@ class Follower(Protocol):
     def take(self, block: Any, /) -> object:
         """Take the samples of a block."""
 
-    def zeros(self, channels: Collection[str], /) -> tuple[Array, Array]:
-        """Estimated zeros of sensors, and their variances."""
+    def zeros(self, channels: Collection[str], /) -> tuple[Array, Array, Array]:
+        """Estimated zeros of sensors, their variances, and deviations by errors of the scene."""
 
     def doubt(self, channels: Collection[str], /) -> None:
         """Let the zeros of these sensors drift by any amount."""
@@ -144,6 +145,7 @@ class FaultSearch:
     def _decide_anew(self) -> None:
         """Discard all evidence of faults."""
         self._decision, self._age = Evidence(self._scene, self._faults, self._settings), 0
+        self._certain = NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - self._settings.name_odds) / len(self._faults))  # Bonferroni
         self._evidence = np.array([twin.evidence for twin in self._twins])
 
     def _made(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower]:
@@ -202,19 +204,23 @@ class FaultSearch:
     def _name(self, place: int, begin: int, chances: Sequence[tuple[str, float]], stamp: int) -> list[Alarm]:
         """Name the fault of a verdict (see `Verdict`), or end it if it is named; return its alarm.
 
-        A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show.
+        A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show. One whose
+        joint has a sensor that is off is not: its stroke transducer may be that, and k is known by what this reads.
         """
         fault = self._faults[place]
         if fault in self._named:
             return self._ended(fault, begin)
         if fault.cause.startswith("cylinder_") and fault.kind == "softer":
-            creeps = int(fault.channel.removeprefix("cylinder_")) - 1 in self._creep.creeping
-            if creeps or stamp - begin < SPAN * SECOND:
+            number = int(fault.channel.removeprefix("cylinder_"))
+            is_off = any(each.cause == f"joint_{number}.sensor" for each in self._named)
+            if is_off or number - 1 in self._creep.creeping or stamp - begin < SPAN * SECOND:
                 return []
         if (found := self._sized(fault, begin)) is None:
             self._decision.discard(place)
             return []
         sized, spread, onset = found
+        if fault.kind == "off" and abs(sized.size) < self._certain * spread:  # its zero still drifts
+            return []
         ranked = tuple(Ranked(cause, chance, ()) for cause, chance in chances)
         evidence = evidence_of(sized, spread) if fault.is_told else ""
         alarm = self._named[sized] = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
@@ -232,7 +238,7 @@ class FaultSearch:
         for fault in self._named:
             if fault.kind == "off":
                 axis, before = self._zeros_before[fault.cause]
-                now, _ = self._twins[0].zeros(hypothesis(self._scene, (fault,)).doubted)
+                now = self._twins[0].zeros(hypothesis(self._scene, (fault,)).doubted)[0]
                 if abs(now[axis] - before) < CAME_BACK * abs(fault.size):
                     return fault
         return None
@@ -246,11 +252,11 @@ class FaultSearch:
         odds = self._settings.name_odds
         sure, usual = math.log(odds / (1.0 - odds)), usual_size(self._scene, fault, self._settings.scene_error)
         if fault.kind == "off":
-            changed, spread = self._change_of_zero(fault, onset)
+            changed, spread, drift = self._change_of_zero(fault, onset)
             spread = math.hypot(spread, usual)
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
-            certain = NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - odds) / len(self._faults))  # for all faults together (Bonferroni)
-            return (changed, spread, onset) if abs(changed.size) > max(least, certain * spread) else None
+            is_known = abs(changed.size) > max(least, self._certain * spread)
+            return (changed, math.hypot(spread, drift), onset) if is_known else None
         least = NormalDist().inv_cdf(0.5 + 0.5 * odds) * usual
         healthy = self._course(fault._replace(size=least), onset)
 
@@ -287,21 +293,24 @@ class FaultSearch:
             return np.full(sum(second.stamp >= onset for second in self._recent), IMPOSSIBLE)
         return np.nan_to_num(found, nan=IMPOSSIBLE)
 
-    def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float]:
-        """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), and the standard deviation.
+    def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float, float]:
+        """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), the standard deviation, the drift.
 
-        An angle sensor has no zero before, so its change may be older than the evidence.
+        An angle sensor has no zero before, so its change may be older than the evidence. The drift is the change in the newest
+        `DELAY`: a zero that still drifts has changed by as much again when the verdict comes.
         """
-        doubted, before = hypothesis(self._scene, (fault,)).doubted, (np.zeros(1), np.zeros(1))
+        doubted, before = hypothesis(self._scene, (fault,)).doubted, tuple(np.zeros((3, 1)))
+        zeros = [(stamp, twin.zeros(doubted)) for stamp, twin in self._repeated(fault)]
+        now = zeros[-1][1]
+        drift = now[0] - zeros[-1 - min(DELAY, len(zeros) - 1)][1][0]
         if fault.channel.startswith("joint_"):
             now = self._twins[self._faults.index(fault) + 1].zeros(doubted)
         else:
-            zeros = [(stamp, twin.zeros(doubted)) for stamp, twin in self._repeated(fault)]
-            before, now = [each for stamp, each in zeros if stamp < onset or stamp == zeros[0][0]][-1], zeros[-1][1]
-        change, spread = now[0] - before[0], np.sqrt(now[1] + before[1])
+            before = [each for stamp, each in zeros if stamp < onset or stamp == zeros[0][0]][-1]
+        change, spread = now[0] - before[0], np.sqrt(now[1] + before[1] + (now[2] - before[2]) ** 2)
         axis = int(np.argmax(np.abs(change) / spread))
         self._zeros_before[fault.cause] = axis, float(before[0][axis])
-        return fault._replace(size=float(change[axis])), float(spread[axis])
+        return fault._replace(size=float(change[axis])), float(spread[axis]), float(drift[axis])
 
     def _repeated(self, fault: Fault) -> Iterator[tuple[int, Follower]]:
         """Run a twin with a fault over the recent seconds; yield each stamp with the twin after that second."""

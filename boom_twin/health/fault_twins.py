@@ -20,11 +20,10 @@ from ..system.child_call import ChildCall, ChildEndedError
 from ..system.processes import usable_cores
 from ..types import SECOND, Alarm, Array, Change, StrokeReading
 from .causes import Hypothesis
-from .fault_search import FaultSearch, Follower, Second
+from .fault_search import DELAY, FaultSearch, Follower, Second
 from .sensor_check import Flags
 
 SPACING = 18_000_000  # ns, least time between samples of a stream: 50 Hz suffice for all motion of the boom
-DELAY = 2 * SECOND  # ns from the end of a second to its verdict
 
 
 class FaultTwins:
@@ -112,7 +111,7 @@ class FaultTwins:
         self._pending = []
 
     def _hand_over(self, second: Second) -> None:
-        self._results.append((second.stamp + SECOND + DELAY, self._worker.submit(self._followed, second)))
+        self._results.append((second.stamp + (1 + DELAY) * SECOND, self._worker.submit(self._followed, second)))
 
     def _followed(self, second: Second) -> list[Alarm]:
         """Let the search follow a second; begin another one if its process has been ended, such as for want of memory."""

@@ -1,7 +1,7 @@
 """Monitor of the lags of all streams behind the strokes, by the estimator of the commissioning check.
 
-A lag is reported if it explains most of what readings are off the prediction, and its size is known to a tenth. If all other
-streams are early by the same time, the strokes are late.
+A lag is reported if it explains most of what readings are off the prediction, beside the deviation that is stated of this, and
+its size is known to a tenth. If all other streams are early by the same time, the strokes are late.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class LagMonitor:
     def begin(self) -> None:
         """Discard all readings, because the boom restarts at rest; alarms last until lags are known to be small."""
         self._number = 0
-        self._means: dict[Stream, deque[tuple[int, Array]]] = {}  # of each block (ns): readings, expected ones
+        self._means: dict[Stream, deque[tuple[int, Array]]] = {}  # of each block (ns), see `StreamReadings`
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -85,11 +85,11 @@ def _exceeds(lag: Lag) -> bool:
 
 def _lag(means: deque[tuple[int, Array]]) -> Lag:
     """Return the lag of the window that a lag explains best, by the channels with all readings."""
-    stamps, both = map(np.array, zip(*means, strict=True))
+    stamps, kept = map(np.array, zip(*means, strict=True))
     found = list[Lag]()
     for count in WINDOWS:
-        newest = both[-count:]
+        newest = kept[-count:]
         newest = newest[:, :, np.isfinite(newest).all(axis=(0, 1))]
         if newest.size:
-            found.append(lag_near(stamps[-count:], newest[:, 0], newest[:, 1]))
+            found.append(lag_near(stamps[-count:], *newest.swapaxes(0, 1)))
     return min(found, key=lambda lag: (lag.left, lag.sigma), default=Lag(0.0, np.inf))

@@ -38,8 +38,7 @@ class _Fault:
     alarm: Alarm
     seen: int
     offset: float = 0.0
-    before: float = math.nan
-    """Residual before a jump."""
+    before: float = math.nan  # residual before a jump
     is_told: bool = True
 
     def ended(self, until: int) -> list[Alarm]:
@@ -97,9 +96,7 @@ class SensorMonitor:
 
         `newest`: by how much the block's last readings are off (strokes: the readings), shape (channels,), if it has any.
         """
-        news = self._back_after_start(end, newest)
-        if findings.flags or self._faults or self._intermittent:
-            news += self._found(findings, start, end, newest)
+        news = [*self._back_after_start(end, newest), *self._found(findings, start, end, newest)]
         self._mask()
         return news
 
@@ -147,8 +144,7 @@ class SensorMonitor:
 
     def _seen(self, channel: int, kind: str, start: int, end: int, findings: SensorFindings) -> list[Alarm]:
         """Begin, keep or end a fault that was found in a block."""
-        key = (channel, kind)
-        fault = self._faults.get(key)
+        fault = self._faults.get(key := (channel, kind))
         size, level = float(findings.jumped[channel]) if kind == "jump" else 0.0, float(findings.level[channel])
         if fault is not None:
             off = np.fmin(abs(fault.offset + size), abs(level - fault.before))

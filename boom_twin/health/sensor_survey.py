@@ -52,7 +52,7 @@ class CheckWork(NamedTuple):
     heard : (channels,) time of the newest reading, s; NaN before the first.
     power, run, since : (channels,) variance of the noise, see `noise2_at`; repetitions of the newest reading; first stamp (s).
     missing, outside : (channels,) share of missing readings; number of readings of the newest block out of range.
-    means : (2, channels) of the newest block, see `boom_twin.health.sensor_check.StreamReadings`. slow : SlowMeans.
+    means : (3, channels) of the newest block, see `boom_twin.health.sensor_check.StreamReadings`. slow : SlowMeans.
     """
 
     stated: float
@@ -226,7 +226,8 @@ def summarise(sensors, stamps, raw, left, sigmas, masked, share):
                 variance += sigmas[t, i] * sigmas[t, i]
         means[:, i] = math.nan
         if known > 0:
-            means[0, i], means[1, i] = read / known, (read - off) / known
+            means[0, i], means[1, i], variance = read / known, (read - off) / known, variance / known
+            means[2, i] = max(variance - sensors.stated, 0.0) + sensors.stated / known  # the mean has less noise
         rate = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span if span > 0.0 else math.nan
         if masked[i]:
             for each in (slow.read, slow.expected, slow.variance, slow.rate, slow.weight):
@@ -234,7 +235,7 @@ def summarise(sensors, stamps, raw, left, sigmas, masked, share):
         elif known > 0:
             slow.read[i] += share * (means[0, i] - slow.read[i])
             slow.expected[i] += share * (means[1, i] - slow.expected[i])
-            slow.variance[i] += share * (variance / known - slow.variance[i])
+            slow.variance[i] += share * (variance - slow.variance[i])
             slow.weight[i] += share * (1.0 - slow.weight[i])
         if math.isfinite(rate) and not masked[i]:
             slow.rate[i] += share * (rate - slow.rate[i])

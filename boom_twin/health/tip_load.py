@@ -19,18 +19,7 @@ AFTER = round(WINDOW / NANO)  # ns from the first passing to a later one that ra
 
 
 class TipLoadMonitor:
-    """Monitor that compares the estimated force at the tip with its limit.
-
-    Parameters
-    ----------
-    limit : float
-        N.
-
-    Attributes
-    ----------
-    alarm : Alarm or None
-        While it lasts.
-    """
+    """Monitor that compares the estimated force at the tip with its `limit` (N); `alarm` is not None while it lasts."""
 
     def __init__(self, limit: float) -> None:
         self._limit = limit

@@ -232,11 +232,11 @@ def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, foun
 
     Forces have none: their zeros change with the posture, which hides a lag.
     """
-    raw: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
-    left: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
+    raw, left = defaultdict[Stream, list[Any]](list), defaultdict[Stream, list[Any]](list)  # stamps and further fields
     for block in _samples(session, topics, window, len(twin.mounts)):
-        _append_by_stream(raw, block)
-        _append_by_stream(left, twin.take(block).residuals)
+        residuals = twin.take(block).residuals
+        _append_by_stream(raw, block.streams, block.stamps, block.values)
+        _append_by_stream(left, residuals.streams, residuals.stamps, residuals.values, residuals.sigmas)
     known = {v.stream for v in found.verdicts} - {v.stream for v in found.verdicts if v.is_wrong and not v.is_sure}
     return {each: _lag(raw[each], left[each]) for each in Stream if each in known - UNTIMED and left[each]}
 
@@ -247,18 +247,17 @@ def _samples(session: Session, topics: Topics, window: TimeWindow, joints: int) 
     return (item for item in SessionSamples(session, topics, wanted, joints, window) if isinstance(item, SampleBlock))
 
 
-def _append_by_stream(columns: dict[Stream, list[tuple[Array, Array]]], block: SampleBlock | Any) -> None:
+def _append_by_stream(columns: dict[Stream, list[Any]], streams: Integers, *fields: Any) -> None:
+    """Append the rows of every stream: stamps and further fields."""
     for stream, code in CODES.items():
-        own = block.streams == code
+        own = streams == code
         if own.any():
-            columns[stream].append((block.stamps[own], block.values[own]))
+            columns[stream].append(tuple(field[own] for field in fields))
 
 
-def _lag(raw: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, Array]]) -> Lag:
+def _lag(raw: Sequence[Any], left: Sequence[Any]) -> Lag:
     """Return the lag of a stream by its readings and their residuals."""
-    (stamps, values), (own, residuals) = (
-        (np.concatenate([each[0] for each in rows]), np.concatenate([each[1] for each in rows])) for rows in (raw, left)
-    )
+    (stamps, values), (own, residuals, sigmas) = (map(np.concatenate, zip(*rows, strict=True)) for rows in (raw, left))
     common, here, there = np.intersect1d(stamps, own, return_indices=True)
     read, off = values[here], residuals[there]
     is_read = np.isfinite(read).any(axis=0) & np.isfinite(off).any(axis=0)
@@ -267,5 +266,5 @@ def _lag(raw: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, Array]]
     if whole.sum() < 2 or not is_read.any():
         return Lag(0.0, math.inf)
     columns = np.flatnonzero(is_read[:width])
-    read, off = read[whole][:, columns], off[whole][:, columns]
-    return lag_of(common[whole], read, read - off)
+    read, off, sigmas = (each[whole][:, columns] for each in (read, off, sigmas[there]))
+    return lag_of(common[whole], read, read - off, sigmas**2)

@@ -138,8 +138,8 @@ class Twin(SampleTaker):
         self.requests.zero(found)
         return found
 
-    def zeros(self, channels: Collection[str]) -> tuple[Array, Array]:
-        """Return the estimated zeros of sensors of angles, IMU and forces, and their variances.
+    def zeros(self, channels: Collection[str]) -> tuple[Array, Array, Array]:
+        """Return the estimated zeros of sensors of angles, IMU and forces, their variances, and their errors by the scene.
 
         Parameters
         ----------
@@ -148,8 +148,8 @@ class Twin(SampleTaker):
 
         Returns
         -------
-        values, variances : ndarray, shape (channels,)
-            m/s^2, rad, N, and their squares.
+        values, variances, errors : ndarray, shape (channels,)
+            m/s^2, rad, N, their squares, and standard deviations of what errors of the scene make of forces.
         """
         return self._boom.zeros(channels)
 

@@ -113,14 +113,14 @@ def _at(chosen: NDArray[np.int64], numbers: NDArray[np.int64], means: Array, rea
 SPAN = 2.0  # s, span whose mean is removed, so that zeros and slow model errors are no lag
 LONGEST, COARSE = 1.0, 0.05  # s, largest lag of the search; spacing of the first guesses, and largest step of Gauss-Newton
 FEWEST = 2.0  # least effective number of moving spans
-CLEAR = 0.4  # largest squared residual with the lag, relative to that without
+CLEAR = 0.4  # largest squared residual with the lag, relative to that without, both beside the expected variance
 FLOOR = 1e-3  # s, standard deviation of a lag by model errors
 
 
 class Lag(NamedTuple):
     """Lag of a stream and standard deviation, s. `sigma` is infinite if no lag is found.
 
-    left : squared residual with the lag, relative to that without.
+    left : squared residual with the lag, relative to that without, both beside the expected variance.
     """
 
     lag: float
@@ -128,25 +128,29 @@ class Lag(NamedTuple):
     left: float = 1.0
 
 
-def lag_of(stamps: NDArray[np.int64], read: Array, expected: Array) -> Lag:
-    """Return the lag of readings behind expected ones, both (k, channels), at `stamps` (k,) in ns: near the best guess."""
-    guesses, residuals = np.arange(-LONGEST, LONGEST + COARSE, COARSE), _Residuals(stamps, read, expected)
-    sizes = np.array([_sizes(residuals.left(lag)[0]) for lag in guesses])
-    return lag_near(stamps, read, expected, float(guesses[int((sizes / sizes.min(axis=0)).sum(axis=1).argmin())]))
+def lag_of(stamps: NDArray[np.int64], read: Array, expected: Array, variances: Array) -> Lag:
+    """Return the lag of readings behind expected ones at `stamps` (k,) in ns: near the best guess.
+
+    Readings, expected ones, and the expected variances of their differences: (k, channels) each.
+    """
+    guesses, residuals = np.arange(-LONGEST, LONGEST + COARSE, COARSE), _Residuals(stamps, read, expected, variances)
+    sizes = np.array([residuals.sizes(residuals.left(lag)[0]) for lag in guesses])
+    return lag_near(stamps, read, expected, variances, float(guesses[int((sizes / sizes.min(axis=0)).sum(axis=1).argmin())]))
 
 
-def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, guess: float = 0.0) -> Lag:
+def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, variances: Array, guess: float = 0.0) -> Lag:
     """Return the lag of readings behind expected ones, as `lag_of`, by Gauss-Newton from a guess (s).
 
-    Each channel counts by what is left of it. The scatter among spans gives the deviation.
+    Each channel counts by what is left of it, beside its expected variance: what the prediction states as its error is no
+    lag. The scatter among spans gives the deviation.
     """
     if (stamps[-1] - stamps[0]) * NANO < FEWEST * SPAN:
         return Lag(0.0, math.inf)
-    residuals, lag = _Residuals(stamps, read, expected), guess
+    residuals, lag = _Residuals(stamps, read, expected, variances), guess
     at_zero = residuals.left(0.0)
     for _ in range(round(2.0 * LONGEST / COARSE)):
         left, slopes = at_zero if lag == 0.0 else residuals.left(lag)
-        sizes = _sizes(left)
+        sizes = residuals.sizes(left)
         by, weight = residuals.summed(np.nan_to_num(np.array([-left * slopes, slopes**2]) / sizes)).sum(axis=-1)
         if not weight.sum() > 0.0 or weight.sum() ** 2 < FEWEST * (weight**2).sum():
             return Lag(0.0, math.inf)
@@ -156,26 +160,26 @@ def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, guess: flo
             break
     else:
         return Lag(0.0, math.inf)
-    share = left.shape[1] / float((_sizes(at_zero[0]) / sizes).sum())
+    share = left.shape[1] / float((residuals.sizes(at_zero[0]) / sizes).sum())
     if abs(lag) > LONGEST or (abs(lag) > COARSE and share > CLEAR):
         return Lag(0.0, math.inf)
     scatter = math.sqrt(float(((by - change * weight) ** 2).sum())) / float(weight.sum())
     return Lag(lag, math.hypot(scatter, FLOOR), share)
 
 
-def _sizes(left: Array) -> Array:
-    """Return the sum of squares of each channel, above 0."""
-    return np.asarray(np.nansum(left**2, axis=0) + 1e-300)
-
-
 class _Residuals:
     """Residuals of readings to the expected ones of another time, less their means in spans of `SPAN`; see `lag_of`."""
 
-    def __init__(self, stamps: NDArray[np.int64], read: Array, expected: Array) -> None:
+    def __init__(self, stamps: NDArray[np.int64], read: Array, expected: Array, variances: Array) -> None:
+        self._least = variances.sum(axis=0) + 1e-300
         self._times, self._read = (stamps - stamps[0]) * NANO, read
         self._starts = np.flatnonzero(np.diff(self._times // SPAN, prepend=-1.0))
         self._sizes = np.diff(self._starts, append=len(stamps))
         self._expected = np.stack([expected, np.gradient(expected, self._times, axis=0)])
+
+    def sizes(self, left: Array) -> Array:
+        """Return the sum of squares of each channel, and of its expected variances."""
+        return np.asarray(np.nansum(left**2, axis=0) + self._least)
 
     def summed(self, values: Array) -> Array:
         """Return the sums of values (.., k, channels) over every span."""

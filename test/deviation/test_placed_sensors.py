@@ -55,12 +55,30 @@ def test_rest_and_a_turn_about_one_joint_read_as_their_closed_form(at: float, tu
         f.mean[PREDICTION, drive + 1] = stroke_rate
         f.mean[PREDICTION, drive + 2] = -p.curvature[0] * stroke_rate**2 / p.slope[0]  # at which the joint turns evenly
         place_live(boom.plan.tables, boom.compiled.anchor, boom.live, boom.compiled.work, p, f)
-        write_ways(boom.live, boom.compiled.work, p, f)
-        move_sites(boom.plan.tables, boom.live, p, f, 0.0, gravity)
+        write_ways(boom.compiled.anchor, boom.live, boom.compiled.work, p, f)
+        move_sites(boom.plan.tables, boom.compiled.anchor, boom.live, p, f, 0.0, gravity)
         along, across = G * math.sin(angle) - at * rate**2, G * math.cos(angle)
         c, s = math.cos(turned), math.sin(turned)
         assert f.felt[channels] == pytest.approx([c * along + s * across, c * across - s * along], abs=1e-6)
         assert f.motion[p.channels[channels[0]].site, 5] == pytest.approx(rate, rel=1e-7)
+
+
+def test_an_acceleration_is_across_the_boom_where_it_is_not_where_it_rests() -> None:
+    """Else a harmonic vibration would have a mean acceleration along the boom."""
+    scene, at, turn, turning = booms.scene_of(booms.one_rigid()), 3.0, 0.05, 2.0
+    boom = BoomPredictor(scene, Settings(), places={"imu_2": Place(1, at)})
+    boom.start(strokes_of_angles(scene, np.array([0.5])))
+    p, f, (tables, anchor, live, work, *_) = boom.posture, boom.filters, boom.compiled
+    drive, (channel, _) = drive_place(p), np.flatnonzero(p.channels.stream == CODES[Stream.IMU_2])
+    f.mean[PREDICTION, drive] += turn / p.slope[0]
+    f.mean[PREDICTION, drive + 2] = turning / p.slope[0]
+    place_live(tables, anchor, live, work, p, f)
+    write_ways(anchor, live, work, p, f)
+    move_sites(tables, anchor, live, p, f, 0.0, gravity_in_base(scene))
+    angle = f.motion[p.channels[channel].site, 2]
+    assert angle == pytest.approx(0.5 + turn, abs=1e-3)
+    expected = [G * math.sin(angle), G * math.cos(angle) + at * turning]
+    assert f.felt[channel : channel + 2] == pytest.approx(expected, abs=0.01)
 
 
 def test_the_tip_is_one_place_among_others() -> None:

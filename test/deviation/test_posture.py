@@ -100,7 +100,7 @@ def test_modal_forces_of_curved_ways_are_those_of_the_masses_accelerations(scene
         places.append(work.position.copy())
     curved = (places[0] + places[1] - 2.0 * places[2]) / h**2
     f.mean[PREDICTION, drive_place(p) + N : drive_place(p) + 2 * N] = v
-    write_ways.py_func(live, work, p, f)
+    write_ways.py_func(live, live, work, p, f)
     expected = -(p.motions * p.masses) @ curved
     m = int(p.modes[0])
     assert f.swing[:m] == pytest.approx(

@@ -21,14 +21,15 @@ from .recorded import run, session
 
 RATE, BLOCK = 20, 0.1  # readings of a block, its length in s
 NONE = np.zeros(2, dtype=bool)  # masked channels
+SIGMA = 1e-3  # rad, noise of a reading
 
 
-def block_of(raw: Array, expected: Array, number: int) -> StreamReadings:
-    """Return readings (k, channels), evenly in time."""
+def block_of(raw: Array, expected: Array, number: int, sigma: float = SIGMA) -> StreamReadings:
+    """Return readings (k, channels), evenly in time, and the deviation that is expected of their residuals."""
     count, edge = len(raw), np.zeros(raw.shape[1])
     stamps = number * BLOCK_TIME + np.arange(count) * (BLOCK_TIME // max(count, 1))
-    check = SensorCheck(1.0, 0.0, edge, edge, 0.0)
-    return check.summary(MeasuredRows(stamps, raw, raw - expected, np.ones(raw.shape)), NONE, 0.0)
+    check = SensorCheck(SIGMA, 0.0, edge, edge, 0.0)
+    return check.summary(MeasuredRows(stamps, raw, raw - expected, np.full(raw.shape, sigma)), NONE, 0.0)
 
 
 def angles(times: Array) -> Array:
@@ -47,9 +48,9 @@ def judged(monitor: LagMonitor, lag: float, seconds: float, first: int = 0, **mo
         times, readings = BLOCK * (number + np.arange(RATE) / RATE), {}
         expected = angles(times)
         for stream, own in lags.items():
-            read = angles(times - own) * more.get("scale", 1.0) + more.get("bias", 0.0) + rng.normal(0.0, 1e-3, (RATE, 2))
+            read = angles(times - own) * more.get("scale", 1.0) + more.get("bias", 0.0) + rng.normal(0.0, SIGMA, (RATE, 2))
             read[:, 1] += math.nan if "lost" in more else 0.0
-            readings[stream] = block_of(read, expected, number)
+            readings[stream] = block_of(read, expected, number, more.get("sigma", SIGMA))
         news += monitor.take(readings, dict.fromkeys(lags, NONE), Block(number))
     return news
 
@@ -77,10 +78,12 @@ def test_strokes_are_late_if_all_other_streams_are_early() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lag", "wrong"), [(0.0, {}), (0.01, {}), (0.0, {"bias": 0.02}), (0.0, {"scale": 1.05}), (0.0, {"lost": 1.0})]
+    ("lag", "wrong"),
+    [(0.0, {}), (0.01, {}), (0.15, {"sigma": 0.05}), (0.0, {"bias": 0.02}), (0.0, {"scale": 1.05}), (0.0, {"lost": 1.0})],
 )
 def test_nothing_else_is_a_lag(lag: float, wrong: dict[str, float]) -> None:
-    """Nor a small lag: encoders that read 5 % too much, or so many rad, or one that is silent."""
+    """Nor a small lag, or one within the deviation that the prediction states: nor encoders that read 5 % too much, or so many
+    rad, or one that is silent."""
     assert judged(LagMonitor(Stream.STROKES), lag, 60.0, **wrong) == []
 
 
