@@ -17,20 +17,20 @@ import hashlib
 from typing import Any
 
 from llvmlite import ir
+from numba import __version__ as numba_version
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     NativeValue,
     infer_getattr,
-    intrinsic,
     lower_getattr_generic,
     models,
     register_model,
     typeof_impl,
     unbox,
 )
-from numba.types import NamedTuple, Type, int64
+from numba.types import Array, NamedTuple, Type
 
-from .jit import HeldFields, kernel
+from .jit import ARRAY, HeldFields
 
 TUPLE_FLAG = 1 << 26  # Py_TPFLAGS_TUPLE_SUBCLASS
 
@@ -49,6 +49,9 @@ class ReferenceModel(models.PrimitiveModel):
     """An address."""
 
     def __init__(self, manager: Any, of: Reference) -> None:
+        for each in (manager.lookup(kind) for kind in of.fields.types if isinstance(kind, Array)):
+            if [each.get_field_position(name) for name in ARRAY] != list(range(len(ARRAY))):
+                raise ImportError(f"numba {numba_version} keeps arrays otherwise than the versions that were tested")
         super().__init__(manager, of, manager.lookup(of.fields).get_value_type().as_pointer())
 
 
@@ -122,28 +125,6 @@ def _is_tuple(c: Any, value: Any) -> Any:
     flags = c.builder.call(flags_of, [kind])
     c.pyapi.decref(kind)
     return c.builder.icmp_unsigned("!=", c.builder.and_(flags, word(TUPLE_FLAG)), word(0))
-
-
-@intrinsic
-def copy_fields(_: Any, fields: Any, room: Any) -> Any:
-    """Copy the fields of a named tuple by reference to the array `room` of bytes, if it has room; gives how many these are."""
-
-    def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        address, given = arguments[0], context.make_array(signature.args[1])(context, builder, arguments[1])
-        size = ir.Constant(ir.IntType(64), context.get_abi_sizeof(address.type.pointee))
-        with builder.if_then(builder.icmp_signed(">=", given.nitems, size)):
-            places = [builder.bitcast(each, ir.IntType(8).as_pointer()) for each in (given.data, address)]
-            copy = builder.module.declare_intrinsic("llvm.memcpy", [places[0].type, places[1].type, size.type])
-            builder.call(copy, [*places, size, ir.IntType(1)(0)])
-        return size
-
-    return int64(fields, room), write
-
-
-@kernel
-def write_fields(fields, room):
-    """Copy a named tuple's fields to bytes, see `copy_fields`."""
-    return copy_fields(fields, room)
 
 
 def register(kind: type) -> None:
