@@ -34,6 +34,8 @@ ARRAY = ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides") 
 _BY_REFERENCE: set[type] = set()
 _UNREGISTERED: list[type] = []
 _REGISTERING = Lock()
+_NEWEST = dict[int, Any]()  # what `hold` returned, by the identity of its argument
+MOST_HELD = 16
 
 
 def by_reference(kind: type[Fields]) -> type[Fields]:
@@ -96,6 +98,7 @@ class HeldFields(int):
     """Address of the fields of a named tuple that kernels take by reference, see `hold`; with all that stands there."""
 
     fields: Any
+    type: Any = None  # numba's, once it is known
     _room: Any
 
     @classmethod
@@ -149,7 +152,7 @@ class Kernel:
         return self.dispatcher._numba_type_
 
     def __call__(self, *arguments: Any) -> Any:
-        return self.dispatcher(*arguments)
+        return self.dispatcher(*map(_argument, arguments))
 
     def for_types_of(self, *examples: Any) -> Callable[..., Any]:
         """The compiled code for arguments of the types of `examples`, for a caller whose arguments always are of these.
@@ -212,6 +215,19 @@ def kernel(function: Callable[..., Any]) -> Kernel:
 def inner(function: Callable[..., Any]) -> Inner:
     """Compile as `kernel` does, inlined wherever a kernel calls it; Python runs it as it stands."""
     return Inner(function, forceinline=True, no_cpython_wrapper=True)
+
+
+def _argument(value: Any) -> Any:
+    """Return what `hold` does; for one of the newest `MOST_HELD` tuples, what it did before."""
+    if type(value) not in _BY_REFERENCE:
+        return value
+    if (held := _NEWEST.get(id(value))) is None:
+        held = hold(value)
+        with _REGISTERING:
+            while len(_NEWEST) >= MOST_HELD:
+                del _NEWEST[next(iter(_NEWEST))]
+            _NEWEST[id(value)] = held  # it holds the tuple, so that no other one has its identity
+    return held
 
 
 def hold(value: Any) -> Any:
