@@ -315,7 +315,7 @@ def _gradually(state: State, step: float, least: float, rests: Callable[[float, 
 
 def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> bool:
     """Solve for equilibrium under `load` times gravity from the present guess; return True if a stable one is found."""
-    loaded = replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
+    loaded = plan if load == 1.0 else replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
     scheme, still = prepare(REST, 0.0, 0.0, work.weights), np.zeros(plan.joints)
     for cylinder in plan.tables.cylinders:  # reset angles of barrels and rods, to stay within half a turn after failed attempts
         own = slice(cylinder.first_part, cylinder.first_part + cylinder.parts)

@@ -137,7 +137,7 @@ class LogClock(NamedTuple):
         votes, last, clock = Counter[int](), dict[int, tuple[NDArray[np.uint64], int]](), cls([], [0])
         for number, (channels, times) in enumerate(pieces):
             older, before = np.zeros(len(times), np.uint64), np.zeros(len(times), np.int64)
-            for channel in np.unique(channels).tolist():
+            for channel in sorted(set(channels.tolist())):
                 rows, (held, place) = np.flatnonzero(channels == channel), last.get(channel, (np.zeros(2, np.uint64), 0))
                 own, at = np.concatenate([held, times[rows]]), np.concatenate([[place], PIECE * number + rows])
                 p, q, r = own[:-2], own[1:-1], own[2:]

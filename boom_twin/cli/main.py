@@ -28,6 +28,7 @@ from ..system.terminal_text import PrintableStream, open_closed_streams
 from .output import QuietStream
 
 use_one_blas_thread()
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it looks for them in every installed package, which takes 12 ms
 
 COMMANDS: dict[str, str] = {
     "check": "validate a scene and list what its model contains",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ..kernels.jit import inner
-from .states import ALL_VALVES, BURST, OPEN, PREDICTION, VALVES, whole
+from ..kernels.jit import inner, kernel
+from .states import ALL_VALVES, BURST, ESTIMATE, IS_OLD, OPEN, PREDICTION, VALVES, all_states, whole
 
 MODELS = BURST + 1  # of a mixture
 LEAST_CHANCE = 1e-60  # of a model, so that none is 0: the rates let it grow again, but for a load while a valve is open
@@ -62,19 +62,16 @@ def interact(f, mixture, size, h, memory):
     one, other, last, shares, width = f.p[first], f.p[first + 1], f.p[first + 2], f.shares, whole(size)
     for i in range(size):
         by_one, by_two, by_three = one[i], other[i], last[i]
+        a, b = between(shares[0], two[i], three[i])
+        c, d = between(shares[1], two[i], three[i])
+        e, g = between(shares[2], two[i], three[i])
         for k in range(width):
-            x, y, z = by_one[k], by_two[k], by_three[k]
-            by_one[k] = shares[0, 0] * x + shares[0, 1] * y + shares[0, 2] * z
-            by_two[k] = shares[1, 0] * x + shares[1, 1] * y + shares[1, 2] * z
-            by_three[k] = shares[2, 0] * x + shares[2, 1] * y + shares[2, 2] * z
+            x, y, z, second, third = by_one[k], by_two[k], by_three[k], two[k], three[k]
+            by_one[k] = shares[0, 0] * x + shares[0, 1] * y + shares[0, 2] * z + (a * second + b * third)
+            by_two[k] = shares[1, 0] * x + shares[1, 1] * y + shares[1, 2] * z + (c * second + d * third)
+            by_three[k] = shares[2, 0] * x + shares[2, 1] * y + shares[2, 2] * z + (e * second + g * third)
     for target in range(MODELS):
         f.chances[first + target] = f.likely[target]
-        own, covariance = shares[target], f.p[first + target]
-        for i in range(size):
-            to_two, to_three = between(own, two[i], three[i])
-            line = covariance[i]
-            for k in range(width):
-                line[k] += to_two * two[k] + to_three * three[k]
     for i in range(size):
         mean = f.x[first, i]
         for target in range(MODELS):
@@ -103,20 +100,36 @@ def between(shares, two, three):
 
 
 @inner
-def mix(f, mixture, size):
-    """Write mean and covariance of a mixture."""
-    first, shares, mean, spread, width = first_model(mixture), f.shares[0], f.mean[mixture], f.spread[mixture], whole(size)
-    for k in range(MODELS):
-        shares[k] = f.chances[first + k]
+def mix_means(f, mixture, size):
+    """Write the mean of a mixture."""
+    first, mean = first_model(mixture), f.mean[mixture]
     two, three = apart(f, first, size)
     for i in range(size):
-        mean[i] = f.x[first, i] + shares[1] * two[i] + shares[2] * three[i]
+        mean[i] = f.x[first, i] + f.chances[first + 1] * two[i] + f.chances[first + 2] * three[i]
+
+
+@kernel
+def mix(f, mixture, size):
+    """Write mean and covariance of a mixture."""
+    mix_means(f, mixture, size)
+    f.status[IS_OLD] *= mixture != ESTIMATE
+    first, spread, width = first_model(mixture), f.spread[mixture], whole(size)
+    shares = f.chances[first : first + MODELS]
+    two, three = apart(f, first, size)
+    for i in range(size):
         to_two, to_three = between(shares, two[i], three[i])
         line, by_one, by_two, by_three = spread[i], f.p[first, i], f.p[first + 1, i], f.p[first + 2, i]
         for k in range(width):
             line[k] = (
                 shares[0] * by_one[k] + shares[1] * by_two[k] + shares[2] * by_three[k] + to_two * two[k] + to_three * three[k]
             )
+
+
+@inner
+def renew_estimate(p, f):
+    """Write the covariance of the estimate if readings have corrected its models since."""
+    if f.status[IS_OLD] == 1:
+        mix(f, ESTIMATE, all_states(p))
 
 
 @inner

@@ -17,9 +17,9 @@ from .channels import (
 from .delayed import delayed_row, note_lateness
 from .kalman import ANGLE_ZERO, correct, gain_after, take_gains, take_innovation
 from .learning import SURPRISE
-from .mixture import MODELS, mix, weigh_models
+from .mixture import MODELS, mix_means, renew_estimate, weigh_models
 from .rows import SWAY_SHARE, clear, difference, read, variance_of
-from .states import ALL_BURST, ALL_VALVES, ESTIMATE, FED, FED_STAMP, PREDICTION, all_states, zero_place
+from .states import ALL_BURST, ALL_VALVES, ESTIMATE, FED, FED_STAMP, IS_OLD, PREDICTION, all_states, zero_place
 
 INEXACT = 0.03  # error of the model: share of accelerations and rates of turn at a site (rms), of forces beside those at rest
 LEARN_NOISE = 0.02  # weight of one reading in the learnt noise of its channel
@@ -32,7 +32,7 @@ CLEAR_RATE = 3.0  # standard deviations by which a reading's rate must differ fr
 
 @kernel
 def take_sensor(p, f, stream, first, residuals, stamp, newest):
-    """Correct the estimate by the residuals of one sample against the prediction.
+    """Correct the estimate by the residuals of one sample against the prediction; `spread` is left to `renew_estimate`.
 
     Parameters
     ----------
@@ -53,6 +53,8 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         last += 1
     if errors == 0 or age > OLDEST:
         return
+    if lag >= 0:
+        renew_estimate(p, f)
     patience = SLOW if p.channels[first].kind == READS_COORDINATE else 0
     f.status[FED], f.status[FED_STAMP] = 1, max(f.status[FED_STAMP], newest + patience)
     if age > 0.0:
@@ -95,7 +97,8 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         take_gains(f.p[ALL_VALVES + k], f.gains[k], count, all_states(p))
     f.taken[stream] = stamp
     weigh_models(f, ESTIMATE)
-    mix(f, ESTIMATE, all_states(p))
+    mix_means(f, ESTIMATE, all_states(p))
+    f.status[IS_OLD] = 1
     if lag >= 0:
         correct_stamps(p, f, lag)
 

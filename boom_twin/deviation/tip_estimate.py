@@ -21,6 +21,7 @@ from .estimate_row import (
     VELOCITY_COVARIANCE,
 )
 from .kalman import ANGLE_ZERO
+from .mixture import renew_estimate
 from .rows import acceleration_row, column_row, difference, rate_row, read, spread_of
 from .states import ESTIMATE, PREDICTION, force_place, zero_place
 
@@ -33,6 +34,7 @@ def write_tip_estimate(p, f, live, results, out):
     """Write the estimate beside the newest prediction; see `boom_twin.deviation.estimate_row.WIDTH`."""
     n, m, size, load = p.drives.shape[0], p.modes[0], zero_place(p), force_place(p)
     mean, expected = f.mean[ESTIMATE], f.mean[PREDICTION]
+    renew_estimate(p, f)
     for a in range(3):
         column_row(p, p.readings, n + a, 1.0, f.rows[a])
         rate_row(p, n + a, f.rows[3 + a])

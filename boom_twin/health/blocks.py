@@ -95,7 +95,7 @@ def by_block(rows: Rows) -> Iterator[tuple[int, Rows]]:
     if (first := int(numbers.min())) == numbers.max():
         yield first, rows
         return
-    for number in np.unique(numbers).tolist():
+    for number in sorted(set(numbers.tolist())):
         own = numbers == number
         yield number, type(rows)(*(column[own] for column in rows))
 

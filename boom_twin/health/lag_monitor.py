@@ -17,7 +17,7 @@ from ..types import NANO, SENSORS, Alarm, Array, Stream
 from ..wiring.readings import CLEAR, SPAN, Lag, lag_near
 from .alarms import change_text
 from .blocks import BLOCK, Block
-from .sensor_check import StreamReadings
+from .sensor_check import Readings
 
 LEAST = 0.025  # s, lag from which on it is an alarm: a payload or a spring that is wrong shifts vibration by less
 SIGMAS = 10.0  # standard deviations that a lag has at least: before it has been so for a while its size is a mixture
@@ -46,16 +46,14 @@ class LagMonitor:
         """Return True if the stream and the strokes are known to be of different times."""
         return stream in self._alarms or self._drive in self._alarms
 
-    def take(
-        self, readings: Mapping[Stream, StreamReadings], failing: Mapping[Stream, NDArray[np.bool_]], block: Block
-    ) -> list[Alarm]:
+    def take(self, readings: Readings, failing: Mapping[Stream, NDArray[np.bool_]], block: Block) -> list[Alarm]:
         """Take a block without the channels of failing sensors; return the alarms that began or ended."""
         if block.number != self._number + 1:
             self._means.clear()
         self._number = block.number
         for stream, each in readings.items():
             if len(each.rows.stamps) and not SENSORS[stream].beside:
-                means = block.start, np.where(failing[stream], np.nan, each.means)
+                means = block.start, np.where(failing[stream], np.nan, each.means[:3])
                 self._means.setdefault(stream, deque(maxlen=WINDOWS[0])).append(means)
         return [] if block.number % EVERY else self._judge(block.end)
 

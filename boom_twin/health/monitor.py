@@ -15,7 +15,7 @@ from .causes import explains
 from .deviations import SIGMAS, DeviationMonitor
 from .fault_twins import FaultTwins
 from .lag_monitor import LagMonitor
-from .sensor_check import NOISE_OVER, SensorCheck, StreamReadings, sensor_ranges
+from .sensor_check import NOISE_OVER, Readings, SensorCheck, StreamReadings, sensor_ranges
 from .sensor_monitor import SensorMonitor
 from .tip_load import TipLoadMonitor
 from .wiring_monitor import WiringMonitor
@@ -182,12 +182,12 @@ class HealthMonitor:
         expected = np.full(strokes.shape, np.nan) if is_shaken else np.zeros(strokes.shape)
         return news + self._check(self._drive, block, predictions.stamps, strokes, expected)
 
-    def _compare(self, block: Block, readings: dict[Stream, StreamReadings], strokes: Array) -> list[Alarm]:
+    def _compare(self, block: Block, readings: Readings, strokes: Array) -> list[Alarm]:
         """Compare readings with the prediction; `strokes` (n,) are means of the measured ones, m."""
         news = list[Alarm]()
         failing = {stream: sensors.masked for stream, sensors in self._sensors.items()}
         if self._drive is not Stream.ANGLES:
-            news += self._wiring.take(block, strokes, failing)
+            news += self._wiring.take(block, strokes, readings, failing)
         if self._wiring.has_wrong_strokes:
             return news
         news += self._lags.take(readings, failing, block)

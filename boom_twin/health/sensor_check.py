@@ -91,7 +91,8 @@ class SensorFindings(NamedTuple):
 class StreamReadings(NamedTuple):
     """A block of k readings.
 
-    means : (3, channels) of readings with a prediction, of these, of the variances of their differences; NaN of none.
+    means : (4, channels) of readings that have a prediction, of these predictions, of the variances of their differences, and
+    of all readings; NaN of none.
     is_bent : True if trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by
     second and by third differences, motion much less by third ones.
     """
@@ -100,6 +101,9 @@ class StreamReadings(NamedTuple):
     means: Array
     slow: SlowMeans
     is_bent: bool
+
+
+Readings = Mapping[Stream, StreamReadings]
 
 
 class SensorCheck:
@@ -119,7 +123,7 @@ class SensorCheck:
         self._sigma = math.sqrt(sigma**2 + resolution**2 / 12.0)
         self._fastest = fastest
         count, margin, stated2 = len(low), 5.0 * self._sigma, self._sigma**2
-        self.slow, unknown = SlowMeans(*np.zeros((5, count))), np.full((3, count), np.nan)
+        self.slow, unknown = SlowMeans(*np.zeros((5, count))), np.full((4, count), np.nan)
         self._known = CheckWork(
             stated=stated2,
             patience=int(np.clip(readings_of_frozen(sigma, resolution, FALSE_ALARM) - 1.0, *REPEATS)),

@@ -52,7 +52,7 @@ class CheckWork(NamedTuple):
     heard : (channels,) time of the newest reading, s; NaN before the first.
     power, run, since : (channels,) variance of the noise, see `noise2_at`; repetitions of the newest reading; first stamp (s).
     missing, outside : (channels,) share of missing readings; number of readings of the newest block out of range.
-    means : (3, channels) of the newest block, see `boom_twin.health.sensor_check.StreamReadings`. slow : SlowMeans.
+    means : (4, channels) of the newest block, see `boom_twin.health.sensor_check.StreamReadings`. slow : SlowMeans.
     """
 
     stated: float
@@ -217,8 +217,11 @@ def summarise(sensors, stamps, raw, left, sigmas, masked, share):
     means, slow, last = sensors.means, sensors.slow, stamps.shape[0] - 1
     span = (stamps[last] - stamps[0]) * NANO
     for i in range(raw.shape[1]):
-        known, read, off, variance = 0, 0.0, 0.0, 0.0
+        known, read, off, variance, heard, every = 0, 0.0, 0.0, 0.0, 0, 0.0
         for t in range(last + 1):
+            if math.isfinite(raw[t, i]):
+                heard += 1
+                every += raw[t, i]
             if math.isfinite(left[t, i]):
                 known += 1
                 read += raw[t, i]
@@ -228,6 +231,7 @@ def summarise(sensors, stamps, raw, left, sigmas, masked, share):
         if known > 0:
             means[0, i], means[1, i], variance = read / known, (read - off) / known, variance / known
             means[2, i] = max(variance - sensors.stated, 0.0) + sensors.stated / known  # the mean has less noise
+        means[3, i] = every / heard if heard > 0 else math.nan
         rate = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span if span > 0.0 else math.nan
         if masked[i]:
             for each in (slow.read, slow.expected, slow.variance, slow.rate, slow.weight):

@@ -19,7 +19,8 @@ from ..types import SENSORS, Alarm, Array, Mount, Place, Ranked, Stream, StrokeR
 from ..wiring.check import Checked, channel_name, check, likely
 from ..wiring.readings import Channel, RestModel, Series, Window, is_checked
 from .alarms import UNKNOWN
-from .blocks import Block, means_of
+from .blocks import Block
+from .sensor_check import Readings
 
 KIND = "wiring"  # kind of all its alarms
 SCENE = "scene"  # channel and cause of the alarm that the scene is of another boom
@@ -99,7 +100,9 @@ class WiringMonitor:
         is_of_reading = alarm.kind in {"range", "jump", "noise", "spikes", "intermittent"}
         return is_of_reading and alarm.channel in self._chosen(self._wrong | self._doubted)
 
-    def take(self, block: Block, strokes: Array, failing: Mapping[Stream, NDArray[np.bool_]]) -> list[Alarm]:
+    def take(
+        self, block: Block, strokes: Array, readings: Readings, failing: Mapping[Stream, NDArray[np.bool_]]
+    ) -> list[Alarm]:
         """Take a block with its mean strokes (n,) in m; return the alarms that began or ended.
 
         Channels that are `failing` by themselves are left out once their wiring is known to be right.
@@ -107,8 +110,8 @@ class WiringMonitor:
         if self._age < CHECKS[-1]:
             means = {Stream.STROKES: strokes}
             for stream, own in self._own.items():
-                if stream is not Stream.STROKES and (rows := block.readings(stream)) is not None:
-                    means[stream] = np.where(failing[stream] & self._right[own], np.nan, means_of(rows.raw))
+                if stream is not Stream.STROKES and len(readings[stream].rows.stamps):
+                    means[stream] = np.where(failing[stream] & self._right[own], np.nan, readings[stream].means[3])
             self._blocks.append((block.start, means))
             self._silent = {s: failing[s] & np.isnan(means.get(s, np.nan)) for s in self._channels}
         self._age += 1

@@ -9,7 +9,8 @@ counting, which was nearly half of a step.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Sequence
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from threading import Lock
@@ -29,9 +30,12 @@ LAYOUT = 0x1 | 0x2 | 0x100 | 0x400
 """Flags of an array that its type depends on: C and Fortran order, aligned, writeable."""
 CONFIG_FILE = ".numba_config.yaml"
 """numba takes its settings from this file in the working directory, which may be a received session's."""
+ARRAY = ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides")  # parts of an array in numba's order
 _BY_REFERENCE: set[type] = set()
 _UNREGISTERED: list[type] = []
 _REGISTERING = Lock()
+_NEWEST = dict[int, Any]()  # what `hold` returned, by the identity of its argument
+MOST_HELD = 16
 
 
 def by_reference(kind: type[Fields]) -> type[Fields]:
@@ -94,6 +98,7 @@ class HeldFields(int):
     """Address of the fields of a named tuple that kernels take by reference, see `hold`; with all that stands there."""
 
     fields: Any
+    type: Any = None  # numba's, once it is known
     _room: Any
 
     @classmethod
@@ -147,7 +152,7 @@ class Kernel:
         return self.dispatcher._numba_type_
 
     def __call__(self, *arguments: Any) -> Any:
-        return self.dispatcher(*arguments)
+        return self.dispatcher(*map(_argument, arguments))
 
     def for_types_of(self, *examples: Any) -> Callable[..., Any]:
         """The compiled code for arguments of the types of `examples`, for a caller whose arguments always are of these.
@@ -192,6 +197,16 @@ class Inner(Kernel):
         return self.py_func(*arguments)
 
 
+def _packed(value: Any) -> tuple[str, Sequence[Any]]:
+    """Return how compiled code has a value in memory: a format of `struct`, and its numbers."""
+    if isinstance(value, np.ndarray):  # see `ARRAY`
+        return f"{5 + 2 * value.ndim}q", (0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides)
+    if isinstance(value, tuple):
+        layouts, numbers = zip(*map(_packed, value), strict=True)
+        return "".join(layouts), [number for each in numbers for number in each]
+    return "?" if isinstance(value, bool) else "d" if isinstance(value, float) else "q", [value]
+
+
 def kernel(function: Callable[..., Any]) -> Kernel:
     """Compile `function`: nopython, cached on disk, without the interpreter's lock, no exceptions for division."""
     return Kernel(function)
@@ -202,20 +217,28 @@ def inner(function: Callable[..., Any]) -> Inner:
     return Inner(function, forceinline=True, no_cpython_wrapper=True)
 
 
+def _argument(value: Any) -> Any:
+    """Return what `hold` does; for one of the newest `MOST_HELD` tuples, what it did before."""
+    if type(value) not in _BY_REFERENCE:
+        return value
+    if (held := _NEWEST.get(id(value))) is None:
+        held = hold(value)
+        with _REGISTERING:
+            while len(_NEWEST) >= MOST_HELD:
+                del _NEWEST[next(iter(_NEWEST))]
+            _NEWEST[id(value)] = held  # it holds the tuple, so that no other one has its identity
+    return held
+
+
 def hold(value: Any) -> Any:
     """Return a stand-in for a named tuple that compiled code takes by reference; anything else as it is.
 
     Its fields are written once, here, and not with every call. It stands for this very tuple: what its arrays hold may change.
     """
-    if type(value) not in _BY_REFERENCE:
-        return value
-    from .references import write_fields
-
-    if not write_fields.is_compiled:
+    if type(value) not in _BY_REFERENCE or _numba().config.DISABLE_JIT:
         return value
     _register_references()  # the class may have come after the first kernel was made
-    kept, room = value._make(map(hold, value)), np.zeros(0, np.uint8)
-    write = write_fields.for_types_of(value, room)  # numba would look long for the type of what holds an address
-    while (size := write(kept, room)) > len(room):
-        room = np.zeros(size, np.uint8)
+    kept = value._make(map(hold, value))
+    layout, numbers = _packed(kept)
+    room = np.frombuffer(struct.pack(layout, *numbers), np.uint8)
     return HeldFields.of(value, kept, room)

@@ -21,7 +21,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ..errors import BagError
-from .atomic_files import DRAFT, sync_folder, write_atomic
+from .atomic_files import DRAFT, SYNCED_AT_END, sync_folder, write_atomic
 from .received_files import real_path, sha256_of
 
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
@@ -100,9 +100,12 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
             _check_earlier(place, kind)
             _discard(replaced)
             _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
+            SYNCED_AT_END.add(building)
             yield building
+            SYNCED_AT_END.remove(building)
             _complete(building, kind)
         except BaseException as error:
+            SYNCED_AT_END.discard(building)
             with suppress(OSError):
                 _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
                 (building / UNFINISHED).unlink()

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from ..deviation.channels import write_expected_readings
+from ..deviation.mixture import renew_estimate
 from ..deviation.sensor_model import TURN
 from ..deviation.sensors import take_sensor
 from ..deviation.step import step_lengths
@@ -55,25 +56,28 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
     was looked at before; of strokes, ``state.strokes`` and ``state.taken`` hold them. What it gives is added to `found`, an
     `UpdateOutput`.
     """
-    row = first
+    row, reason = first, DONE
     while row < stamps.shape[0]:
         stamp, before = stamps[row], found.counts[1]
         if streams[row] != limits.drive:
             if not compare(limits, state, f.lags, streams[row], stamp, values[row], row, trusted, found):
-                return ODD, row
+                reason = ODD
+                break
             take_residuals(limits, state, p, f, before, found)
             row += 1
             continue
         if not trusted:
             if not are_strokes_regular(f.strokes, limits, state, stamp, values[row]):
-                return ODD, row
+                reason = ODD
+                break
             note_stamp(state, limits.drive, stamp)
         state.clock[BEGINS_SLOT] = stamp // SLOT != state.clock[IN_SLOT]
         span = (stamp - state.clock[NEWEST]) * NANO
         status = step_lengths(t, boom, live, work, p, f, span, stamp, state.taken, limits.gravity, out)
         state.clock[STATUS] = status
         if status != OK:
-            return FAILED, row
+            reason = FAILED
+            break
         end_step(state, stamp)
         give_prediction(t.clearances.shape[0], live, bending, out, limits, state, stamp, row, found)
         if span > 0.0:
@@ -86,8 +90,10 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
         write_tip_estimate(p, f, live, results, found.estimates[found.counts[0] - 1])
         row += 1
         if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED]:
-            return LOOK, row - 1
-    return DONE, row
+            reason, row = LOOK, row - 1
+            break
+    renew_estimate(p, f)
+    return reason, row
 
 
 @inner

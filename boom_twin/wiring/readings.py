@@ -151,7 +151,7 @@ def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, variances:
     for _ in range(round(2.0 * LONGEST / COARSE)):
         left, slopes = at_zero if lag == 0.0 else residuals.left(lag)
         sizes = residuals.sizes(left)
-        by, weight = residuals.summed(np.nan_to_num(np.array([-left * slopes, slopes**2]) / sizes)).sum(axis=-1)
+        by, weight = residuals.summed(np.array([-left * slopes, slopes**2]) / sizes).sum(axis=-1)
         if not weight.sum() > 0.0 or weight.sum() ** 2 < FEWEST * (weight**2).sum():
             return Lag(0.0, math.inf)
         change = float(by.sum() / weight.sum())
@@ -179,14 +179,14 @@ class _Residuals:
 
     def sizes(self, left: Array) -> Array:
         """Return the sum of squares of each channel, and of its expected variances."""
-        return np.asarray(np.nansum(left**2, axis=0) + self._least)
+        return np.asarray((left**2).sum(axis=0) + self._least)
 
     def summed(self, values: Array) -> Array:
         """Return the sums of values (.., k, channels) over every span."""
         return np.asarray(np.add.reduceat(values, self._starts, axis=-2))
 
     def left(self, lag: float) -> Array:
-        """Return residuals to the readings expected `lag` s before, and their rates, shape (2, k, channels)."""
+        """Return residuals to the readings expected `lag` s before, and their rates, shape (2, k, channels); 0 if unknown."""
         both, times, then = self._expected.copy(), self._times, self._times - lag
         if lag:
             before = np.clip(np.searchsorted(times, then) - 1, 0, len(times) - 2)
@@ -196,7 +196,7 @@ class _Residuals:
         both[0, (then < 0.0) | (then > times[-1])] = np.nan
         known = np.isfinite(both[0])
         means = self.summed(np.where(known, both, 0.0)) / np.maximum(self.summed(known.astype(float)), 1.0)
-        return np.asarray(np.where(known, both, np.nan) - np.repeat(means, self._sizes, axis=1))
+        return np.asarray(np.where(known, both - np.repeat(means, self._sizes, axis=1), 0.0))
 
 
 class Expected(NamedTuple):

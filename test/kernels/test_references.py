@@ -14,6 +14,7 @@ import pytest
 from compiled import compile_scene
 
 from boom_twin import load_scene
+from boom_twin.kernels import references
 from boom_twin.kernels.jit import _kind, by_reference, hold, kernel
 
 
@@ -66,6 +67,17 @@ def test_a_copy_of_what_is_held_has_fields_of_its_own(copied):
     assert total(both[1]) == 96.0 + 1.5
     both[0].inside.values[:] = 1.0
     assert total(both[1]) == 15.0 + 1.5
+
+
+def test_a_numba_that_keeps_arrays_in_another_order_is_refused(monkeypatch):
+    monkeypatch.setattr(references, "ARRAY", ("data", *references.ARRAY))
+
+    @by_reference
+    class Other(NamedTuple):
+        values: np.ndarray
+
+    with pytest.raises(ImportError, match=r"numba .* keeps arrays otherwise than the versions that were tested"):
+        kernel(lambda other: other.values[0])(Other(np.zeros(1)))
 
 
 def test_neither_a_tuple_nor_held_is_refused():
