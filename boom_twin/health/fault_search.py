@@ -257,7 +257,7 @@ class FaultSearch:
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
             is_known = abs(changed.size) > max(least, self._certain * spread)
             return (changed, math.hypot(spread, drift), onset) if is_known else None
-        least = NormalDist().inv_cdf(0.5 + 0.5 * odds) * usual
+        least = self._certain * usual
         healthy = self._course(fault._replace(size=least), onset)
 
         def gained(size: float) -> Array:
