@@ -98,15 +98,8 @@ class HeldFields(int):
     """Address of the fields of a named tuple that kernels take by reference, see `hold`; with all that stands there."""
 
     fields: Any
+    kept: Any
     type: Any = None  # numba's, once it is known
-    _room: Any
-
-    @classmethod
-    def of(cls, fields: Any, kept: Any, room: np.ndarray) -> HeldFields:
-        """The address of `room`; `kept` are the fields that were written there."""
-        held = cls(room.ctypes.data)
-        held.fields, held._room = fields, (kept, room)
-        return held
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy is of fields of its own: the address is of these."""
@@ -241,4 +234,6 @@ def hold(value: Any) -> Any:
     kept = value._make(map(hold, value))
     layout, numbers = _packed(kept)
     room = np.frombuffer(struct.pack(layout, *numbers), np.uint8)
-    return HeldFields.of(value, kept, room)
+    held = HeldFields(room.ctypes.data)
+    held.fields, held.kept = value, (kept, room)
+    return held
