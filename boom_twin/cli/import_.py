@@ -66,8 +66,8 @@ def run(args: Namespace) -> int:
 
 def _warn(done: ImportedSession, is_without_scene: bool, timezone: str | None) -> None:
     for number, read in done.read.items():
-        if read.rows.remark:
-            warn(f"{done.assignment.tables[number].source}: {read.rows.remark}")
+        for remark in filter(None, (read.rows.remark, read.rows.skipped_text)):
+            warn(f"{done.assignment.tables[number].source}: {remark}")
     if any(read.times.is_local for read in done.read.values()) and timezone is None:
         warn("local times are taken as UTC. Give --timezone, for example Europe/Berlin.")
     if not any(read.times.is_absolute for read in done.read.values()):

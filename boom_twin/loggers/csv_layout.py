@@ -185,6 +185,16 @@ class LoggerLayout(CsvLayout):
     is_comma: bool  # True if the decimal mark is a comma
     samples: list[list[str]]  # first rows of data
     header_line: int
+    head: list[list[str]]  # rows above the data: a logger that restarts repeats them
+
+    def is_data(self, row: list[str]) -> bool:
+        """Return True if a stripped row holds a value. Raise ValueError if it is a header of other columns."""
+        if row in self.head or (row[0][:1] == "#" and row[0].lower() not in BLANKS):
+            return False
+        is_one = any(map(_is_value, row))
+        if not is_one and _recognised(row, {}) > 1:
+            raise ValueError(f"another header, {self.separator.join(row)[:80]!r}")
+        return is_one
 
     @property
     def text(self) -> str:
@@ -205,6 +215,7 @@ def layout_of(path: Path) -> LoggerLayout:
     text = codecs.getincrementaldecoder(encoding)("replace").decode(data).removeprefix("\ufeff")
     if not is_whole:
         text = text[: text.rfind("\n") + 1]
+    text = re.sub(r"[^\n]*\0[^\n]*", "", text)  # a power cut leaves NULs in the last line
     for separator in SEPARATORS:
         if (found := _table(path, text, separator, encoding)) is not None:
             return found
@@ -222,8 +233,9 @@ def _encoding(path: Path) -> str:
     decoder = codecs.getincrementaldecoder("utf-8")()
     with path.open("rb") as file:
         head = file.read(HEAD)
-        if head.count(0) > len(head) // 4:
-            return "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
+        first, second = head[::2].count(0), head[1::2].count(0)
+        if abs(first - second) > len(head) // 4:
+            return "utf-16-le" if second > first else "utf-16-be"
         try:
             block = head
             while block:
@@ -247,10 +259,7 @@ def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout
     if width < 2 or count < 0.5 * len(tail):
         return None
     numeric = [place for place in range(width) if _is_numeric([row[place] for row in tail if place < len(row)])]
-    first = len(rows)
-    while first and _is_data(rows[first - 1][1], numeric):
-        first -= 1
-    if len(numeric) < 2 or first == len(rows):
+    if len(numeric) < 2 or (first := _first_data(rows, numeric)) == len(rows):
         return None
     if not first:
         raise BagError(f"{path}: numbers stand in its first line. Write a line above with the names of the columns.")
@@ -259,13 +268,29 @@ def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout
     line, names = max(_headers(above), key=lambda header: _recognised(header[1], units))
     if sum(place < len(names) and bool(names[place]) for place in numeric) < 2:
         return None
-    samples = [row for _, row in rows[first:]]
-    begin = rows[first - 1][0] + 1
+    head, samples = ([row for _, row in part] for part in (rows[:first], rows[first:]))
     cells = [row[place] for row in samples for place in numeric if place < len(row) and not _MOMENT.fullmatch(row[place])]
     given = [units.get(place, "") for place in range(len(names))]
-    return LoggerLayout(
-        encoding, separator, names, begin, given, _has_decimal_comma(path, cells, separator), samples[:200], line
-    )
+    is_comma = _has_decimal_comma(path, cells, separator)
+    return LoggerLayout(encoding, separator, names, rows[first - 1][0] + 1, given, is_comma, samples[:200], line, head)
+
+
+def _first_data(rows: list[tuple[int, list[str]]], numeric: list[int]) -> int:
+    """Return the index of the first row of data: below the first header that names half as many columns as the best.
+
+    Later headers and comments are in between the data. Columns count if recognised, or if they are numeric where none is.
+    """
+    units = next((found for _, row in reversed(rows) if (found := _units(row, numeric))), {})
+    is_data = [_is_data(row, numeric) for _, row in rows]
+    heads = [*_headers([row for row, is_one in zip(rows, is_data, strict=True) if not (is_one or _units(row[1], numeric))])]
+    scores = [_recognised(names, units) for _, names in heads]
+    if max(scores, default=0) < 2:
+        scores = [sum(place < len(names) and bool(names[place]) for place in numeric) for _, names in heads]
+    header = min((line for (line, _), score in zip(heads, scores, strict=True) if 2 * score >= max(scores)), default=0)
+    for place, (line, _) in enumerate(rows):
+        if line > header and is_data[place] and not any(_units(row, numeric) for _, row in rows[place + 1 : place + 2]):
+            return place
+    return len(rows)
 
 
 def _headers(above: list[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:

@@ -247,6 +247,37 @@ def test_what_cannot_be_known_is_refused_with_its_place(tmp_path: Path, fault: s
     assert words in capsys.readouterr().err and not (tmp_path / "s").exists()
 
 
+LINES = GOOD.splitlines()
+BETWEEN = {  # lines of files, and how many of them are no readings
+    "a comment": ([*LINES[:40], "pump on", *LINES[40:]], 1),
+    "a header": ([*LINES[:20], LINES[0], *LINES[20:50], "#EOF", LINES[0], *LINES[50:]], 3),
+    "a trailer": ([*LINES, "End of file"], 1),
+    "a power cut": ([*LINES[:40], "\0" * 900, *LINES[40:]], 1),
+    "channel numbers": ([HEAD.replace(" [mm]", ""), "1;2;3;4;5", "s;mm;mm;mm;mm", *LINES[1:]], 0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("between", BETWEEN)
+def test_lines_between_the_readings_cost_no_reading_and_are_told(
+    tmp_path: Path, between: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines, count = BETWEEN[between]
+    (tmp_path / "log.csv").write_text("\n".join([*lines, ""]))
+    assert main(["import", str(tmp_path / "log.csv"), "--out", str(tmp_path / "s")]) == 0
+    told = capsys.readouterr()
+    assert f"log.csv: {ROWS} rows, 0.590 s;" in told.out and ("lines left out" in told.err) == bool(count)
+    assert not count or f"repeated headers or NULs: {count}, the first is line " in told.err
+
+
+@pytest.mark.parametrize("second", [LINES[0].replace("4", "5"), LINES[0] + ";Winkel 1 [deg];Winkel 2 [deg]"])
+def test_blocks_of_other_columns_are_refused_with_the_line(
+    tmp_path: Path, second: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "log.csv").write_text("\n".join([*LINES[:20], second, *LINES[20:], ""]))
+    assert main(["import", str(tmp_path / "log.csv"), "--out", str(tmp_path / "s")]) == 1
+    assert "log.csv, line 21: another header, 'Zeit [s];Zylinder 1" in capsys.readouterr().err
+
+
 def test_files_without_a_common_time_and_parts_of_one_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     angles = table(["Zeit [s];Winkel 1 [deg]"], lambda row: f"{100 + 0.01 * row:.2f}", lambda _: ["1"])
     second = table([HEAD], lambda row: f"{0.6 + 0.01 * row:.2f}", numbers(",", 4))
@@ -262,6 +293,9 @@ def test_files_without_a_common_time_and_parts_of_one_recording(tmp_path: Path, 
     assert main(["import", b, a, *out, "--json"]) == 0
     told = capsys.readouterr()
     assert json.loads(told.out)["counts"] == [2 * ROWS] and "line 62 was cut off (2 of 5 cells) and is left out" in told.err
+    (tmp_path / "b.csv").write_text(second + "\0" * 900)  # the power was cut
+    assert main(["import", str(tmp_path / "b.csv"), "--out", str(tmp_path / "t")]) == 0
+    assert "line 62 was cut off (1 of 5 cells) and is left out" in capsys.readouterr().err
 
 
 def write_parquet(path: Path, times: np.ndarray, values: np.ndarray) -> None:
