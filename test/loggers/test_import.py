@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from datetime import UTC
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -216,6 +217,29 @@ def seconds(row: int) -> str:
 
 GOOD = table([HEAD], seconds, numbers(",", 4))
 GROUPED = table([HEAD], seconds, numbers(",", 3))
+TIMES = {  # unit, first stamp (ns), time of a row
+    "spreadsheet days": ("", AT_14, lambda row: f"{25569 + Decimal(AT_14 + 10_000_000 * row) / (86_400 * 10**9):.12f}"),
+    "given days": (" [d]", AT_14, lambda row: f"{25569 + Decimal(AT_14 + 10_000_000 * row) / (86_400 * 10**9):.12f}"),
+    "seconds since 1904": (" [s]", AT_14, lambda row: f"{Decimal(AT_14 + 10_000_000 * row) / 10**9 + 2_082_844_800}"),
+    "minutes and seconds": (
+        "",
+        3_599_500_000_000,
+        lambda row: f"{(59 + (595 + row) // 600) % 60:02d}:{(59.5 + 0.1 * row) % 60:06.3f}",
+    ),
+}
+
+
+@pytest.mark.parametrize("style", TIMES)
+def test_times_of_spreadsheets_and_labview(tmp_path: Path, style: str) -> None:
+    unit, first, time = TIMES[style]
+    (tmp_path / "log.csv").write_text(table([TIMELESS.replace("Zeit", f"Zeit{unit}")], time, numbers(digits=4)))
+    options = ["--timezone", "UTC", "--out", str(tmp_path / "s")]
+    assert main(["import", str(tmp_path / "log.csv"), *options]) == 0
+    stamps = np.array([stamp for stamp, _ in messages(tmp_path / "s")])
+    assert stamps[0] == pytest.approx(first, abs=1e5)
+    assert np.diff(stamps) == pytest.approx(1e7 if first == AT_14 else 1e8, abs=1e5)
+
+
 FAULTS = {
     "a word": (GOOD.replace("\n0.30;658,8000", "\n0.30;OVL"), "line 32: Zylinder 1 [mm] = 'OVL' is not a number"),
     "a word as time": (GOOD.replace("\n0.30;", "\nPause;"), "line 32: Zeit [s] = 'Pause' is not a time"),
