@@ -113,8 +113,8 @@ class HealthMonitor:
 
     @property
     def failing_strokes(self) -> NDArray[np.bool_]:
-        """Return which sensors of those that drive the model are known to fail, each by itself, shape (n,)."""
-        return self._sensors[self._drive].masked
+        """Return which sensors of those that drive the model give wrong readings, shape (n,)."""
+        return self._sensors[self._drive].unusable
 
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
         """Return which channels of a stream are not compared with the prediction."""
