@@ -280,8 +280,8 @@ def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
     drive = recording.reads.stream.value
     gaps = [Alarm(drive, "gap", start, end, None, f"for {(end - start) * NANO:.2f} s") for start, end in recording.gaps]
     gaps += [
-        Alarm(drive, "clock", start, start, None, f"stamps go on at {(end - first) * NANO:.3f} s")
-        for start, end in recording.clock_sets
+        Alarm(drive, "clock", start, start, None, f"stamps go on at {(end - first) * NANO:.3f} s{f', {n} times' * (n > 1)}")
+        for (start, end), n in Counter(recording.clock_sets).items()
     ]
     return [
         {

@@ -184,7 +184,7 @@ def test_a_proposal_is_edited_and_given_back(tmp_path: Path, capsys: pytest.Capt
     assert sensors["joint_1"] == "none" and sensors["cylinder_1"]["zero"] == 12.5
 
 
-def test_rows_that_repeat_or_step_back_keep_their_order_and_stamps(tmp_path: Path) -> None:
+def test_rows_that_repeat_or_step_back_keep_their_order_and_stamps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     times = [0.00, 0.01, 0.02, 0.02, 0.01, 0.03, *(0.01 * k for k in range(4, 23)), *(0.01 * k for k in range(-495, -475))]
     rows = iter(times)
     text = table(["Zeit [s];" + ";".join(NAMES)], lambda _: f"{next(rows):.2f}", numbers(",", 4), rows=len(times))
@@ -194,6 +194,7 @@ def test_rows_that_repeat_or_step_back_keep_their_order_and_stamps(tmp_path: Pat
     assert [(stamp - shift) / 1e9 for stamp, _ in messages(tmp_path / "s")] == pytest.approx(times)
     logs = [log for _, log, _ in read(scan(tmp_path / "s"), {"cylinder_strokes": "sensor_msgs/msg/JointState"})]
     assert logs == sorted(logs) and logs[-1] - logs[0] == pytest.approx(0.42e9)
+    assert "2 stamps step back" in (told := capsys.readouterr().err) and "1 stamps are that of the one before" in told
 
 
 def test_the_hour_that_comes_twice_in_autumn_is_two_hours(tmp_path: Path) -> None:
