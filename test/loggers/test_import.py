@@ -250,6 +250,7 @@ FAULTS = {
     "no unit": (GOOD.replace(" [mm]", ""), "cylinder_1: no unit is given ('Zylinder 1' of"),
     "unknown unit": (GOOD.replace("[mm]", "[inkr]"), "unit inkr, not m, cm, mm, um, in)"),
     "two for one": (GOOD.replace("Zylinder 4", "Hub 3"), "cylinder_3: it may be 'Hub 3 [mm]' of"),
+    "equal names": (GOOD.replace("Zylinder 4", "Zylinder 3"), "\n  cylinder_3: several columns 'Zylinder 3 [mm]' of"),
     "one is missing": (GOOD.replace("Zylinder 3", "Kran"), "no column for cylinder_3. Not used: 'Kran [mm]'"),
     "two times": (GOOD.replace("Zylinder 4 [mm]", "Zeit [s]"), "several columns 'Zeit [s]'"),
     "no header": (GOOD.partition("\n")[2], "numbers stand in its first line"),
