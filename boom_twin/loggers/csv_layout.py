@@ -259,13 +259,23 @@ def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout
     if width < 2 or count < 0.5 * len(tail):
         return None
     numeric = [place for place in range(width) if _is_numeric([row[place] for row in tail if place < len(row)])]
-    if len(numeric) < 2 or (first := _first_data(rows, numeric)) == len(rows):
+    is_data = [_is_data(row, numeric) for _, row in rows]
+    units = next((found for _, row in reversed(rows) if (found := _units(row, numeric))), {})
+    plain = [row for row, is_one in zip(rows, is_data, strict=True) if not is_one]
+    heads = [*_headers([row for row in plain if not _units(row[1], numeric)] or plain)]
+    scores = [_recognised(names, units) for _, names in heads]
+    if max(scores, default=0) < 2:  # no known names: columns that are numeric below
+        scores = [sum(place < len(names) and bool(names[place]) for place in numeric) for _, names in heads]
+    # data begin below the first header that names half as many columns as the best; later ones are repeated, or refused
+    header = min((line for (line, _), score in zip(heads, scores, strict=True) if 2 * score >= max(scores)), default=0)
+    below = [place for place, (line, _) in enumerate(rows) if line > header and is_data[place]]
+    below = [place for place in below if place + 1 == len(rows) or not _units(rows[place + 1][1], numeric)]
+    if len(numeric) < 2 or not below:
         return None
-    if not first:
+    if not (first := below[0]):
         raise BagError(f"{path}: numbers stand in its first line. Write a line above with the names of the columns.")
-    units = next((found for _, row in reversed(rows[:first]) if (found := _units(row, numeric))), {})
-    above = [row for row in rows[:first] if not _units(row[1], numeric)] or rows[:first]
-    line, names = max(_headers(above), key=lambda header: _recognised(header[1], units))
+    own = [(score, head) for head, score in zip(heads, scores, strict=True) if head[0] <= rows[first - 1][0]]
+    line, names = max(own, key=lambda each: each[0])[1]
     if sum(place < len(names) and bool(names[place]) for place in numeric) < 2:
         return None
     head, samples = ([row for _, row in part] for part in (rows[:first], rows[first:]))
@@ -273,24 +283,6 @@ def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout
     given = [units.get(place, "") for place in range(len(names))]
     is_comma = _has_decimal_comma(path, cells, separator)
     return LoggerLayout(encoding, separator, names, rows[first - 1][0] + 1, given, is_comma, samples[:200], line, head)
-
-
-def _first_data(rows: list[tuple[int, list[str]]], numeric: list[int]) -> int:
-    """Return the index of the first row of data: below the first header that names half as many columns as the best.
-
-    Later headers and comments are in between the data. Columns count if recognised, or if they are numeric where none is.
-    """
-    units = next((found for _, row in reversed(rows) if (found := _units(row, numeric))), {})
-    is_data = [_is_data(row, numeric) for _, row in rows]
-    heads = [*_headers([row for row, is_one in zip(rows, is_data, strict=True) if not (is_one or _units(row[1], numeric))])]
-    scores = [_recognised(names, units) for _, names in heads]
-    if max(scores, default=0) < 2:
-        scores = [sum(place < len(names) and bool(names[place]) for place in numeric) for _, names in heads]
-    header = min((line for (line, _), score in zip(heads, scores, strict=True) if 2 * score >= max(scores)), default=0)
-    for place, (line, _) in enumerate(rows):
-        if line > header and is_data[place] and not any(_units(row, numeric) for _, row in rows[place + 1 : place + 2]):
-            return place
-    return len(rows)
 
 
 def _headers(above: list[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
