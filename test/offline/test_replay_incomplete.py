@@ -17,7 +17,9 @@ from default_boom import strokes_of_posture
 from recordings import scan, write_session
 
 from boom_twin import BagError, Settings, load_scene, replay
+from boom_twin.bag.session_file import WHOLE
 from boom_twin.monitor.data.bag_feed import bag_feed
+from boom_twin.offline.commissioning import wiring_of
 from boom_twin.offline.inputs import ReplayOptions
 from boom_twin.offline.replay import replay_into
 from boom_twin.system.result_folder import REPLAY, result_folder
@@ -73,6 +75,9 @@ def test_a_transducer_is_used_again_as_soon_as_its_readings_are_back(tmp_path: P
         found.append(replay(tmp_path / name, None, tmp_path / f"{name}_out", with_bag=False).columns())
     one, other = (columns["tip_y_m"][(times > 5.2 + span) & (times < 9.9)] for columns in found)
     np.testing.assert_allclose(other, one, atol=0.01)
+    told = "100 readings missing, 0 beyond" if np.isnan(value) else "0 readings missing, 20 beyond"
+    assert wiring_of(tmp_path / "lost", None, None, WHOLE).startswith(f"cylinder_1: {told} the travel; else strokes are within")
+    assert "missing" not in wiring_of(tmp_path / "sound", None, None, WHOLE)
 
 
 @pytest.mark.system
