@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -215,7 +216,7 @@ def layout_of(path: Path) -> LoggerLayout:
     text = codecs.getincrementaldecoder(encoding)("replace").decode(data).removeprefix("\ufeff")
     if not is_whole:
         text = text[: text.rfind("\n") + 1]
-    text = re.sub(r"[^\n]*\0[^\n]*", "", text)  # a power cut leaves NULs in the last line
+    text = "\n".join("" if "\0" in line else line for line in text.split("\n"))  # a power cut leaves NULs
     for separator in SEPARATORS:
         if (found := _table(path, text, separator, encoding)) is not None:
             return found
@@ -274,6 +275,9 @@ def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout
         return None
     if not (first := below[0]):
         raise BagError(f"{path}: numbers stand in its first line. Write a line above with the names of the columns.")
+    bare = [len(cells := [*filter(None, row)]) > 1 and all(map(_is_value, cells)) for _, row in rows[:first]]
+    if any(map(all, pairwise(bare))):
+        raise BagError(f"{path}: rows of numbers stand above the header in line {header}. Cut the file there.")
     own = [(score, head) for head, score in zip(heads, scores, strict=True) if head[0] <= rows[first - 1][0]]
     line, names = max(own, key=lambda each: each[0])[1]
     if sum(place < len(names) and bool(names[place]) for place in numeric) < 2:

@@ -254,6 +254,7 @@ FAULTS = {
     "one is missing": (GOOD.replace("Zylinder 3", "Kran"), "no column for cylinder_3. Not used: 'Kran [mm]'"),
     "two times": (GOOD.replace("Zylinder 4 [mm]", "Zeit [s]"), "several columns 'Zeit [s]'"),
     "no header": (GOOD.partition("\n")[2], "numbers stand in its first line"),
+    "numbers above": ("\n".join([*GOOD.splitlines()[1:20], GOOD]), "rows of numbers stand above the header in line 20. Cut"),
     "no table": ("nothing\nto see", "no table found. The file begins with 'nothing'"),
     "no time": (GOOD.replace("Zeit", "Nr"), "no column of times among"),
     "ms or s": (table([TIMELESS], lambda row: f"{0.15 * row:.2f}", numbers(",", 4)), "the times may be in s or ms"),
