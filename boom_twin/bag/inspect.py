@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..messages.cdr_decoder import has_header, stamp_in
 from ..messages.type_store import jazzy
 from ..types import NANO
+from .mcap_records import MOST_TOGETHER
 from .reader import Session, scan
 from .session_file import CDR, WHOLE, SessionFile, TimeWindow, as_bag_error, schema_of
 
@@ -25,26 +26,20 @@ def spacing_faults(stamps: NDArray[np.int64]) -> Iterator[str]:
     around, tiny = 32, 0.1  # steps, more than a packet has; share of the largest of them, less than sampling jitters
     steps = np.diff(stamps)
     if len(back := np.flatnonzero(steps < 0)):
-        first, then = stamps[back[0]] - stamps.min(), stamps[back[0] + 1] - stamps.min()
-        yield (
-            f"{len(back)} stamps step back, the first from {first * NANO:.3f} to {then * NANO:.3f} s. "
-            "Look for a counter that wraps, a clock that was set, two publishers, or a looped bag."
-        )
+        one, two = (stamps[back[0] : back[0] + 2] - stamps.min()) * NANO
+        told = "Look for a counter that wraps, a clock that was set, two publishers, or a looped bag"
+        yield f"{len(back)} stamps step back, the first from {one:.3f} to {two:.3f} s. {told}."
     if shared := int((steps == 0).sum()):
         most = int(np.diff(np.flatnonzero(np.r_[1, steps, 1])).max())
-        yield (
-            f"{shared} stamps are that of the one before, and such readings are left out: up to {most} readings share a stamp. "
-            "Export stamps with more digits, or look for two publishers."
-        )
+        told = f"up to {most} readings share one, of which one is used. Export more digits, or look for two publishers"
+        yield f"{shared} stamps are that of the one before: {told}."
     if len(ahead := steps[steps > 0]) > around:
         largest = np.lib.stride_tricks.sliding_window_view(np.pad(ahead, around // 2, "edge"), around + 1).max(axis=1)
         starts = np.flatnonzero(ahead >= tiny * largest)
         if 1 < len(starts) <= 0.6 * len(ahead):
-            period = float(np.median(np.diff(np.cumsum(ahead)[starts]))) * NANO
-            yield (
-                f"readings come in bursts of {len(ahead) / len(starts):.0f}, {period:.3g} s "
-                "apart: they are stamped on arrival, and the boom seems to jerk. Let the logger stamp each when it is measured."
-            )
+            count, period = len(ahead) / len(starts), float(np.median(np.diff(np.cumsum(ahead)[starts]))) * NANO
+            told = "they are stamped on arrival, so the boom seems to jerk. Stamp each when it is measured"
+            yield f"readings come in bursts of {count:.0f}, {period:.3g} s apart: {told}."
 
 
 SENSORS_IN = slice(12, 40)  # bytes of a JointState behind its stamp, up to the number of the first sensor
@@ -94,7 +89,9 @@ class Tally:
                 self._compare(log_time - stamp)
                 sensors = data[SENSORS_IN]
                 self._sensors = self._sensors or sensors
-                if sensors == self._sensors:  # on a bus, each sensor has messages of its own
+                if (
+                    sensors == self._sensors and len(self.stamps) < MOST_TOGETHER
+                ):  # on a bus, each sensor has messages of its own
                     self.stamps.append(stamp)
             else:
                 self.unset += 1
