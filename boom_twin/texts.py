@@ -43,7 +43,7 @@ class Sentence(NamedTuple):
 
 SENTENCES = {
     "stuck": Sentence("{thing} repeats one reading again and again", "Check its cable and supply"),
-    "noise": Sentence("{thing} is much noisier than similar sensors", "Check its cable, shield and mount"),
+    "noise": Sentence("{thing} is much noisier than expected", "Check its cable, shield and mount"),
     "spikes": Sentence("{thing} gives single readings far from their neighbours", "Check its cable and plug"),
     "jump": Sentence("{thing} jumped faster than the boom can move", "Check its mount; if it stays, set its zero"),
     "dropout": Sentence("{thing} gives no readings", "Check its cable, supply and driver"),

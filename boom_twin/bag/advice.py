@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from ..errors import BagError
 from ..messages.cdr_decoder import CdrDecoder
 from ..messages.sample_decoder import MOST_NAMES
 from ..messages.topic_table import Qos, Topic, Topics
 from ..types import SECOND, SENSORS, Stream
-from .inspect import BagInfo, Tally
+from .inspect import BagInfo, Tally, spacing_faults
 from .metadata import profiles
 from .reader import Session, TopicInfo, check_topic, read_blocks, readable
 from .session_file import CDR
@@ -91,11 +93,7 @@ def _stamps(tally: Tally) -> Iterator[str]:
             f"{tally.name}: {tally.unset} of {tally.count} messages have no header.stamp and are left out. "
             "Let the driver set it."
         )
-    if tally.not_increasing:
-        yield (
-            f"{tally.name}: {tally.not_increasing} of {tally.count} stamps are not after the one before, and such "
-            "messages are left out. Look for two publishers, a looped bag, or a clock that was set."
-        )
+    yield from (f"{tally.name}: {sentence}" for sentence in spacing_faults(np.array(tally.stamps)))
 
 
 _USUAL = Qos(reliability="reliable", durability="volatile", depth=100)

@@ -72,6 +72,7 @@ def summarise(path: Path) -> CsvFile:
         counts={number: counts[stream] for stream, number in numbers.items()},
         start=int(logs.min()),
         end=int(logs.max()),
+        notes={"file": read[0].rows.skipped_text} if read[0].rows.skipped else {},
         readings=readings,
         joints=assignment.joints,
     )

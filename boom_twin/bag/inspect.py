@@ -2,17 +2,47 @@
 
 from __future__ import annotations
 
+from array import array
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..messages.cdr_decoder import has_header, stamp_in
 from ..messages.type_store import jazzy
 from ..types import NANO
+from .mcap_records import MOST_TOGETHER
 from .reader import Session, scan
 from .session_file import CDR, WHOLE, SessionFile, TimeWindow, as_bag_error, schema_of
+
+
+def spacing_faults(stamps: NDArray[np.int64]) -> Iterator[str]:
+    """Yield a sentence each if a sensor's stamps (ns) step back, are equal, or come in bursts; with the remedy."""
+    around, tiny = 32, 0.1  # steps, more than a packet has; share of the largest of them, less than sampling jitters
+    steps = np.diff(stamps)
+    if len(back := np.flatnonzero(steps < 0)):
+        one, two = (stamps[back[0] : back[0] + 2] - stamps.min()) * NANO
+        told = "Look for a counter that wraps, a clock that was set, two publishers, or a looped bag"
+        yield f"{len(back)} stamps step back, the first from {one:.3f} to {two:.3f} s. {told}."
+    if shared := int((steps == 0).sum()):
+        most = int(np.diff(np.flatnonzero(np.r_[1, steps, 1])).max())
+        told = f"up to {most} readings share one, of which one is used. Export more digits, or look for two publishers"
+        yield f"{shared} stamps are that of the one before: {told}."
+    if len(ahead := steps[steps > 0]) > around:
+        largest = np.lib.stride_tricks.sliding_window_view(np.pad(ahead, around // 2, "edge"), around + 1).max(axis=1)
+        starts = np.flatnonzero(ahead >= tiny * largest)
+        if 1 < len(starts) <= 0.6 * len(ahead):
+            count, period = len(ahead) / len(starts), float(np.median(np.diff(np.cumsum(ahead)[starts]))) * NANO
+            told = "they are stamped on arrival, so the boom seems to jerk. Stamp each when it is measured"
+            yield f"readings come in bursts of {count:.0f}, {period:.3g} s apart: {told}."
+
+
+SENSORS_IN = slice(12, 40)  # bytes of a JointState behind its stamp, up to the number of the first sensor
 
 
 class Skew(NamedTuple):
@@ -40,6 +70,8 @@ class Tally:
     gap_after: int = 0
     not_increasing: int = 0  # number of messages whose stamp is not after that of the message before
     unset: int = 0  # number of messages with a stamp of 0 or too short for a stamp
+    stamps: array[int] = field(default_factory=lambda: array("q"))  # of messages with the sensors of the first
+    _sensors: bytes = b""
     _skewed: int = 0  # messages whose log time is compared with their stamp
     _skews: tuple[int, int, int] = (2**64, 0, -(2**64))  # least, sum and largest of log time minus stamp, ns
     _before: int | None = None
@@ -54,6 +86,12 @@ class Tally:
             stamp = stamp_in(data)
             if stamp:
                 self._compare(log_time - stamp)
+                sensors = data[SENSORS_IN]
+                self._sensors = self._sensors or sensors
+                if (
+                    sensors == self._sensors and len(self.stamps) < MOST_TOGETHER
+                ):  # on a bus, each sensor has messages of its own
+                    self.stamps.append(stamp)
             else:
                 self.unset += 1
         if stamp:

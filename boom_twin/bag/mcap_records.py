@@ -143,24 +143,25 @@ def check_ends(path: Path, file: BinaryIO) -> None:
         raise BagError(f"{path}: {fault}. {REMEDY}")
 
 
-def summary_start(path: Path) -> int | None:
-    """Return the offset of a file's summary; None if it is incomplete or corrupt."""
+def summary_start(path: Path, moved: int | None = None) -> int | None:
+    """Return the offset of a file's summary; None if it is incomplete or corrupt. It has `moved` if bytes are lost."""
     with open_received(path) as file:
-        ends = _footer(file, path.stat().st_size)
+        ends = _footer(file, path.stat().st_size, moved)
     return ends[0] if ends and ends[1] else None
 
 
-def _footer(file: BinaryIO, size: int) -> tuple[int, bool] | None:
+def _footer(file: BinaryIO, size: int, moved: int | None = None) -> tuple[int, bool] | None:
     """Return the summary's offset, and True if offset and checksum (if any) are valid. None without a whole footer."""
     file.seek(max(0, size - FOOTER.size))
     tail = file.read()
     if len(tail) < FOOTER.size or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
         return None
     _, _, start, _, checksum, _ = FOOTER.unpack(tail)
-    start = start or size - FOOTER.size
+    start = moved or start or size - FOOTER.size
     if start > size - FOOTER.size:
         return start, False
-    return start, checksum in (0, checksum_of(file, start, size - len(MCAP0_MAGIC) - 4))
+    is_unknown = checksum == 0 and moved is None
+    return start, is_unknown or checksum == checksum_of(file, start, size - len(MCAP0_MAGIC) - 4)
 
 
 def checksum_of(file: BinaryIO, start: int, end: int) -> int:

@@ -94,7 +94,7 @@ def definitions_of(path: Path) -> FileDefinitions:
                     case Metadata(name=name, metadata=notes) if name == NOTES:
                         found.notes |= notes
                     case DataEnd(data_section_crc=checksum):
-                        is_data = False
+                        is_data, summary = False, summary or summary_start(path, piece.offset + len(piece.content))
                         with open_received(path) as file:
                             found.is_summed = checksum != 0 and checksum == checksum_of(file, 0, piece.offset)
                     case Statistics() as counts:

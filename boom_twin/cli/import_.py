@@ -64,9 +64,13 @@ def run(args: Namespace) -> int:
 
 
 def _warn(done: ImportedSession, is_without_scene: bool, timezone: str | None) -> None:
+    from ..bag.inspect import spacing_faults
+
     for number, read in done.read.items():
-        if read.rows.remark:
-            warn(f"{done.assignment.tables[number].source}: {read.rows.remark}")
+        first = next(iter(read.rows.numbers.values()))
+        spacing = spacing_faults(read.times.stamps[first == first])  # without its empty cells
+        for remark in filter(None, (read.rows.remark, read.rows.skipped_text, *spacing)):
+            warn(f"{done.assignment.tables[number].source}: {remark}")
     if any(read.times.is_local for read in done.read.values()) and timezone is None:
         warn("local times are taken as UTC. Give --timezone, for example Europe/Berlin.")
     if not any(read.times.is_absolute for read in done.read.values()):

@@ -139,7 +139,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         lines += _errors(summary)
     if "tip_load" in summary:
         lines.append(f"load at the tip    {summary['tip_load']}")
-    lines += [f"noise              {told}" for told in noise_as_text(summary)]
+    lines += [f"noise              {told}" for told in [*summary.get("read_out", []), *noise_as_text(summary)]]
     if summary["output_sha256"] is None:
         lines.append("result bag         not written (--no-bag)")
     alarms = summary["alarms"]

@@ -20,7 +20,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the bag and its truth, new or empty")
     moves = parser.add_mutually_exclusive_group()
     moves.add_argument("--random", metavar="POSTURE", help="random moves from this posture (default: the bundled ones)")
-    through = "moves from posture to posture, as arch,low,arch, with rest periods in each; one posture: the boom stands still"
+    through = "moves through named postures, as arch,low,arch, with rest periods in each; one posture: the boom stands still"
     moves.add_argument("--through", metavar="POSTURES", help=through)
     acceleration = "of --through: largest acceleration of the undeformed boom's tip, m/s^2 (0.5)"
     parser.add_argument("--tip-acceleration", type=positive, default=0.5, metavar="A", help=acceleration)

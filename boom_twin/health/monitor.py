@@ -113,8 +113,8 @@ class HealthMonitor:
 
     @property
     def failing_strokes(self) -> NDArray[np.bool_]:
-        """Return which sensors of those that drive the model are known to fail or to be wired otherwise, shape (n,)."""
-        return self._sensors[self._drive].masked | self._wiring.wrong(self._drive)
+        """Return which sensors of those that drive the model give wrong readings or are wired otherwise, shape (n,)."""
+        return self._sensors[self._drive].unusable | self._wiring.wrong(self._drive)
 
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
         """Return which channels of a stream are not compared with the prediction."""

@@ -20,6 +20,7 @@ from .sensor_survey import MEASURED
 
 SETTLED = round(WINDOW / NANO)  # ns without the fault after which it has ended
 AGAIN = MEMORY * SECOND  # ns between failures of one intermittent contact
+_WRONG = "stuck", "noise", "jump"
 WHOLE = -1  # place of the whole stream behind its channels
 
 
@@ -62,8 +63,8 @@ class SensorMonitor:
 
     Attributes
     ----------
-    masked : ndarray of bool, shape (channels,)
-        Channels that are not to be trusted; another array once these are others.
+    masked, unusable : ndarray of bool, shape (channels,)
+        Channels not to be judged by, another array once these are others; those whose readings are wrong, if there are any.
     """
 
     def __init__(self, names: tuple[str, ...], stream: Stream, is_predicted: bool = True, absent: Collection[str] = ()) -> None:
@@ -73,7 +74,7 @@ class SensorMonitor:
         self._onsets: dict[int, list[int]] = {}  # of failures, by channel, ns
         self._intermittent: dict[int, Alarm] = {}  # by channel
         self._none: Flags = np.zeros(len(names), dtype=bool)
-        self.masked, self._is_anew = self._none, False
+        self.masked, self.unusable, self._is_anew = self._none, self._none, False
 
     def begin(self) -> None:
         """Note a start from rest: a reading that jumped may have come back unseen."""
@@ -84,11 +85,12 @@ class SensorMonitor:
         """Alarms that last."""
         return (*(fault.alarm for fault in self._faults.values() if fault.is_told), *self._intermittent.values())
 
-    def _mask(self) -> None:
+    def _mask(self, end: int) -> None:
         """Mask the channels that have faults by now."""
-        masked = self._none.copy()
+        places, faults = np.arange(len(self._none)), self._faults.items()
         failing = [channel for channel, kind in self._faults if kind != "spikes"]
-        masked[slice(None) if WHOLE in failing else failing] = True
+        wrong = [c for (c, kind), each in faults if kind in _WRONG or (kind == "range" and each.seen == end)]
+        masked, self.unusable = np.isin(places, failing) | (WHOLE in failing), np.isin(places, wrong)
         self.masked = self.masked if (masked == self.masked).all() else masked
 
     def take(self, findings: SensorFindings, start: int, end: int, newest: Array | None = None) -> list[Alarm]:
@@ -96,8 +98,10 @@ class SensorMonitor:
 
         `newest`: by how much the block's last readings are off (strokes: the readings), shape (channels,), if it has any.
         """
-        news = [*self._back_after_start(end, newest), *self._found(findings, start, end, newest)]
-        self._mask()
+        news = self._back_after_start(end, newest)
+        if findings.flags or self._faults or self._intermittent:
+            news += self._found(findings, start, end, newest)
+        self._mask(end)
         return news
 
     def _found(self, findings: SensorFindings, start: int, end: int, newest: Array | None) -> list[Alarm]:
@@ -144,7 +148,8 @@ class SensorMonitor:
 
     def _seen(self, channel: int, kind: str, start: int, end: int, findings: SensorFindings) -> list[Alarm]:
         """Begin, keep or end a fault that was found in a block."""
-        fault = self._faults.get(key := (channel, kind))
+        key, name = (channel, kind), self._names[channel]
+        fault = self._faults.get(key)
         size, level = float(findings.jumped[channel]) if kind == "jump" else 0.0, float(findings.level[channel])
         if fault is not None:
             off = np.fmin(abs(fault.offset + size), abs(level - fault.before))
@@ -153,7 +158,6 @@ class SensorMonitor:
                 return fault.ended(end)
             fault.seen = end
             return []
-        name = self._names[channel]
         off = size if kind == "jump" else level if kind == "range" and self._is_predicted else math.nan
         evidence = change_text(off, self._sensors.unit) if math.isfinite(off) else ""
         is_first = all(known != channel for known, _ in self._faults)

@@ -192,10 +192,11 @@ def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) ->
             elif own.count(use.channel) > 1:
                 found.unused.append(ColumnUse(number, use.place, reason=f"one of several columns that may be {use.channel}"))
                 header = table.headers[use.place]
-                found.problems.append(
-                    f"{use.channel}: it may be {header!r} of {table.source}, or another. "
-                    f"Give --column {use.channel}={header!r}, or in --columns FILE, columns: {{{use.channel}: none}}."
-                )
+                remedy = f"Give --column {use.channel}={header!r}, or in --columns FILE, columns: {{{use.channel}: none}}."
+                told = f"{use.channel}: it may be {header!r} of {table.source}, or another. {remedy}"
+                if table.headers.count(header) > 1:
+                    told = f"{use.channel}: several columns {header!r} of {table.source}. Rename all but one in the file."
+                found.problems.extend([told] * (told not in found.problems))
             else:
                 _use(found, use)
     return found

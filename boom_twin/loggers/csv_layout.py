@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -184,6 +185,16 @@ class LoggerLayout(CsvLayout):
     is_comma: bool  # True if the decimal mark is a comma
     samples: list[list[str]]  # first rows of data
     header_line: int
+    head: list[list[str]]  # rows above the data: a logger that restarts repeats them
+
+    def is_data(self, row: list[str]) -> bool:
+        """Return True if a stripped row holds a value. Raise ValueError if it is a header of other columns."""
+        if row in self.head or (row[0][:1] == "#" and row[0].lower() not in BLANKS):
+            return False
+        is_one = any(map(_is_value, row))
+        if not is_one and _recognised_count(row, {}) > 1:
+            raise ValueError(f"another header, {self.separator.join(row)[:80]!r}")
+        return is_one
 
     @property
     def text(self) -> str:
@@ -203,6 +214,7 @@ def layout_of(path: Path) -> LoggerLayout:
     text = codecs.getincrementaldecoder(encoding)("replace").decode(data).removeprefix("\ufeff")
     if not is_whole:
         text = text[: text.rfind("\n") + 1]
+    text = "\n".join("" if "\0" in line else line for line in text.split("\n"))  # a power cut leaves NULs
     for separator in SEPARATORS:
         if (found := _table(path, text, separator, encoding)) is not None:
             return found
@@ -220,8 +232,9 @@ def _encoding(path: Path) -> str:
     decoder = codecs.getincrementaldecoder("utf-8")()
     with path.open("rb") as file:
         head = file.read(HEAD)
-        if head.count(0) > len(head) // 4:
-            return "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
+        first, second = head[::2].count(0), head[1::2].count(0)
+        if abs(first - second) > len(head) // 4:
+            return "utf-16-le" if second > first else "utf-16-be"
         try:
             block = head
             while block:
@@ -245,25 +258,33 @@ def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout
     if width < 2 or count < 0.5 * len(tail):
         return None
     numeric = [place for place in range(width) if _is_numeric([row[place] for row in tail if place < len(row)])]
-    first = len(rows)
-    while first and _is_data(rows[first - 1][1], numeric):
-        first -= 1
-    if len(numeric) < 2 or first == len(rows):
+    is_data = [_is_data(row, numeric) for _, row in rows]
+    units = next((found for _, row in reversed(rows) if (found := _units(row, numeric))), {})
+    plain = [row for row, is_one in zip(rows, is_data, strict=True) if not is_one]
+    heads = [*_headers([row for row in plain if not _units(row[1], numeric)] or plain)]
+    scores = [_recognised_count(names, units) for _, names in heads]
+    if max(scores, default=0) < 2:  # no known names: columns that are numeric below
+        scores = [sum(place < len(names) and bool(names[place]) for place in numeric) for _, names in heads]
+    # data begin below the first header that names half as many columns as the best; later ones are repeated, or refused
+    header = min((line for (line, _), score in zip(heads, scores, strict=True) if 2 * score >= max(scores)), default=0)
+    below = [place for place, (line, _) in enumerate(rows) if line > header and is_data[place]]
+    below = [place for place in below if place + 1 == len(rows) or not _units(rows[place + 1][1], numeric)]
+    if len(numeric) < 2 or not below:
         return None
-    if not first:
+    if not (first := below[0]):
         raise BagError(f"{path}: numbers stand in its first line. Write a line above with the names of the columns.")
-    units = next((found for _, row in reversed(rows[:first]) if (found := _units(row, numeric))), {})
-    above = [row for row in rows[:first] if not _units(row[1], numeric)] or rows[:first]
-    line, names = max(_headers(above), key=lambda header: _recognised_count(header[1], units))
+    bare = [len(cells := [*filter(None, row)]) > 1 and all(map(_is_value, cells)) for _, row in rows[:first]]
+    if any(map(all, pairwise(bare))):
+        raise BagError(f"{path}: rows of numbers stand above the header in line {header}. Cut the file there.")
+    own = [(score, head) for head, score in zip(heads, scores, strict=True) if head[0] <= rows[first - 1][0]]
+    line, names = max(own, key=lambda each: each[0])[1]
     if sum(place < len(names) and bool(names[place]) for place in numeric) < 2:
         return None
-    samples = [row for _, row in rows[first:]]
-    begin = rows[first - 1][0] + 1
+    head, samples = ([row for _, row in part] for part in (rows[:first], rows[first:]))
     cells = [row[place] for row in samples for place in numeric if place < len(row) and not _MOMENT.fullmatch(row[place])]
     given = [units.get(place, "") for place in range(len(names))]
-    return LoggerLayout(
-        encoding, separator, names, begin, given, _has_decimal_comma(path, cells, separator), samples[:200], line
-    )
+    is_comma = _has_decimal_comma(path, cells, separator)
+    return LoggerLayout(encoding, separator, names, rows[first - 1][0] + 1, given, is_comma, samples[:200], line, head)
 
 
 def _headers(above: list[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:

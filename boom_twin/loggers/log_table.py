@@ -30,6 +30,13 @@ class LogRows:
     times: dict[int, Times]
     lines: list[int] = field(default_factory=list)
     remark: str = ""
+    skipped: list[int] = field(default_factory=list)  # numbers of lines between the data that are no data
+
+    @property
+    def skipped_text(self) -> str:
+        """Count and first of the skipped lines in words, empty for none."""
+        told = "lines left out, as they are comments, repeated headers or NULs"
+        return f"{told}: {len(self.skipped)}, the first is line {self.skipped[0]}" if self.skipped else ""
 
     def place(self, row: int) -> str:
         """Return the line or row for a message."""
@@ -65,7 +72,7 @@ class CsvLogTable(LogTable):
         return [row[place] for row in self._layout.samples if place < len(row) and row[place]]
 
     def read(self, numbers: Sequence[int], times: Sequence[int]) -> LogRows:
-        """See `LogTable`. A truncated last line and repeated headers are left out."""
+        """See `LogTable`. A truncated last line, comments and repeated headers are left out."""
         parts: dict[int, list[Array]] = {place: [] for place in numbers}
         found = LogRows({}, {place: [] for place in times})
         for piece in read_csv_pieces(self._path, BagError, layout=self._layout):
@@ -82,12 +89,18 @@ class CsvLogTable(LogTable):
         """Return rows padded with blanks to the length of the header, and their line numbers."""
         width, rows, lines = len(piece.names), list[list[str]](), list[int]()
         for row, line in zip(piece.rows, piece.lines, strict=True):
-            if not any(cell.strip() for cell in row) or [cell.strip() for cell in row] == piece.names[: len(row)]:
+            cells = [cell.strip() for cell in row]
+            if len(row) < width and not piece.is_ended and line == piece.lines[-1]:
+                found.remark = f"line {line} was cut off ({len(row)} of {width} cells) and is left out"
+                continue
+            try:
+                is_data = self._layout.is_data(cells)
+            except ValueError as reason:
+                raise BagError(f"{self.source}, line {line}: {reason}. Cut the file there; import takes both parts.") from None
+            if not is_data:
+                found.skipped += [line] * any(cells)
                 continue
             if len(row) < width:
-                if not piece.is_ended and line == piece.lines[-1]:
-                    found.remark = f"line {line} was cut off ({len(row)} of {width} cells) and is left out"
-                    continue
                 row = [*row, *[""] * (width - len(row))]
             elif len(row) > width and any(cell.strip() for cell in row[width:]):
                 told = f"{len(row)} cells, and the header has {width} names"

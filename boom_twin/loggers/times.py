@@ -28,11 +28,13 @@ Text = Annotated[str, Field(min_length=1, max_length=500)]
 STEPS = 1e-4, 0.2  # s, usual range of the step between rows, used to infer the unit
 LATE_1904, EXCEL_DAYS = 3.0e9, (3.0e4, 8.0e4)  # least s since 1904 (LabVIEW), range of days since 1899 (spreadsheets)
 SINCE_1904, SINCE_1899 = 2_082_844_800 * SECOND, 25_569 * 86_400 * SECOND  # ns from 1904 and 1899 to 1970
+MOST = LATEST + SINCE_1899  # ns; later times are stored as this
 QUARTER = 900 * SECOND  # ns, offsets of time zones change only at multiples of it
 _DATE = r"(?P<a>\d{1,4})(?P<mark>[-./ ])(?P<b>\d{1,2}|[A-Za-zÄä]{3,9}\.?)[-./ ](?P<c>\d{1,4})"
 _MONTHS = ("jan", "feb", "mar mär mrz", "apr", "may mai", "jun", "jul", "aug", "sep", "oct okt", "nov", "dec dez")
 """Beginnings of the names of months, English and German."""
-_CLOCK = r"(?P<h>\d{1,2}):(?P<min>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<part>\d+))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
+_PARTS = r"(?::(?P<s>\d{2})(?:[.,:](?P<part>\d+))?|[.,](?P<sub>\d+))?"  # behind h:min, or behind min:s
+_CLOCK = rf"(?P<h>\d{{1,2}}):(?P<min>\d{{2}}){_PARTS}\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
 _MOMENT = re.compile(rf"(?:{_DATE})?[T ,;]*(?:{_CLOCK})?\s*(?P<zone>Z|UTC|[+-]\d{{2}}:?\d{{2}})?")
 
 
@@ -141,6 +143,8 @@ def _numbers(table: LogTable, rows: LogRows, cells: Times, header: str, unit: st
     if not unit:
         values = _values(table, rows, cells, header)
         step = float(np.median(np.diff(values))) if len(values) > 1 else 0.01
+        if step == 0.0:
+            raise BagError(f"{table.source}: most rows have the {header} of the row before. Export it with more digits.")
         fitting = [
             u for u, size in TIME_UNITS.items() if u not in ("min", "h") and STEPS[0] <= step * size / SECOND <= STEPS[1]
         ]
@@ -179,9 +183,9 @@ def _values(table: LogTable, rows: LogRows, cells: Times, header: str) -> Array:
 
 
 def _integers(table: LogTable, rows: LogRows, cells: Times, header: str, size: int) -> Stamps:
-    """Return times in a unit of `size` ns as integers, ns, those beyond `LATEST` as one of these."""
+    """Return times in a unit of `size` ns as integers, ns, those beyond `MOST` as one of these."""
     if isinstance(cells, np.ndarray):
-        cells = np.minimum(cells, -(-LATEST // size))
+        cells = np.minimum(cells, -(-MOST // size))
         if cells.dtype.kind in "iu":
             return cells.astype(np.int64) * size
         if not np.isfinite(cells).all():
@@ -193,7 +197,7 @@ def _integers(table: LogTable, rows: LogRows, cells: Times, header: str, size: i
     stamps = np.empty(len(cells), np.int64)
     for row, text in enumerate(cells):
         try:
-            stamps[row] = min(int((Decimal(text.replace(",", ".")) * size).to_integral_value()), LATEST)
+            stamps[row] = min(int((Decimal(text.replace(",", ".")) * size).to_integral_value()), MOST)
         except (ArithmeticError, ValueError):
             raise BagError(
                 f"{table.source}, {rows.place(row)}: {header} = {text!r} is not a time. Correct it, or leave the line out."
@@ -230,8 +234,9 @@ def _moments(table: LogTable, rows: LogRows, texts: list[str], header: str, orde
     if matches[0]["zone"]:
         return TableTimes(naive - offsets, f"{header}: date and time with offset", True)
     if not has_date:
-        days = np.cumsum(np.r_[0, np.diff(naive) < -43_200 * SECOND])  # past midnight
-        return TableTimes(naive + days * 86_400 * SECOND, f"{header}: time of day without a date", False)
+        turn, told = (3600, "minutes and seconds") if matches[0]["sub"] else (86_400, "time of day without a date")
+        turns = np.cumsum(np.r_[0, np.diff(naive) < -turn // 2 * SECOND])  # past midnight, or the full hour
+        return TableTimes(naive + turns * turn * SECOND, f"{header}: {told}", False)
     return TableTimes(_to_utc(naive, zone), f"{header}: local date and time ({order})", True, zone is None)
 
 
@@ -262,7 +267,9 @@ def _day(a: str | None, b: str, c: str, order: str) -> int:
 
 
 def _clock(match: re.Match[str]) -> int:
-    hour, part = int(match["h"]), (match["part"] or "")[:9]
+    hour, part = int(match["h"]), (match["part"] or match["sub"] or "")[:9]
+    if match["sub"]:  # mm:ss.f
+        return (hour * 60 + int(match["min"])) * SECOND + int(part.ljust(9, "0"))
     if match["half"]:
         hour = hour % 12 + 12 * (match["half"][0] in "pP")
     if hour > 23:

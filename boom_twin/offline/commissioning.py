@@ -21,10 +21,12 @@ from ..messages.mapping import NO_LAG, mapping_from
 from ..messages.topic_table import Sensor, Topics, usual
 from ..scene.edit import loaded
 from ..scene.load import SceneSource
+from ..scene.schema import Scene
 from ..twin.blocks import CODES, SampleBlock
 from ..twin.twin import Twin
 from ..types import SENSORS, Array, Place, Stream, StrokeReading
 from ..wiring.check import STROKES_ALONE, Checked, Verdict, check, finding
+from ..wiring.hypotheses import SLACK, si
 from ..wiring.readings import Channel, Lag, RestModel, Series, Window, is_checked, lag_of
 from .inputs import of_another_boom
 from .session_samples import SessionSamples, decoder_of
@@ -44,6 +46,7 @@ class Commissioning:
     # lag of each stream against the strokes; empty if it was not asked for, or the strokes are not known
     lags: Mapping[Stream, Lag]
     absent: list[str]  # channels that are in no message, proposed as ``none``
+    lost: list[str]  # sentences on strokes with missing or impossible readings
 
     @property
     def wrong(self) -> list[Verdict]:
@@ -68,11 +71,9 @@ def wiring_of(bag: Path, scene: SceneSource | SessionScene, mapping: str | Path 
         found = commission(bag, scene, mapping, TimeWindow(window.start, duration), with_lags=False)
     except (BagError, UsageError) as error:
         return f"not checked: {str(error).splitlines()[0].rstrip('.')}"
-    if not found.wrong and found.checked.has_strokes_alone:
-        return STROKES_ALONE
     if not found.wrong:
         still = "" if found.checked.moved else f", as far as a boom tells that stands still for {duration:g} s"
-        return f"as expected{still}"
+        return "; else ".join([*found.lost, STROKES_ALONE if found.checked.has_strokes_alone else f"as expected{still}"])
     told = "; ".join(f"{each.channel} {finding(each, found.checked)}" for each in found.wrong)
     return f"{told}. `boom_twin mapping --check {bag}` proposes a mapping"
 
@@ -144,7 +145,19 @@ def commission(
                 delay = round(topics.inputs[stream].delay + lag.lag, 3)
                 entry = document.setdefault("inputs", {}).setdefault(stream.value, {})
                 entry["delay"] = "auto" if abs(delay) < most_lag else delay
-    return Commissioning(found, document, lags, absent)
+    return Commissioning(found, document, lags, absent, [*_lost(found, series[Stream.STROKES], own.scene)])
+
+
+def _lost(found: Checked, series: Mapping[str, Series], scene: Scene) -> Iterator[str]:
+    """Yield a part of a sentence for each cylinder with strokes that are missing, or beyond the travel by `SLACK` of it."""
+    verdicts = [verdict for verdict in found.verdicts if verdict.stream is Stream.STROKES]
+    for verdict, joint in zip(verdicts, scene.joints, strict=True):
+        if (way := verdict.best or verdict.declared).name not in series:
+            continue
+        share = si(way, SENSORS[Stream.STROKES].units, series[way.name].values) / joint.cylinder.max_stroke
+        missing, outside = np.isnan(share).sum(), (np.abs(share - 0.5) > 0.5 + SLACK).sum()
+        if missing or outside:
+            yield f"{verdict.channel}: {missing} readings missing, {outside} beyond the travel"
 
 
 def _mapping_content(session: Path, mapping: Path | None) -> dict[str, Any]:

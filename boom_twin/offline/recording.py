@@ -12,15 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.sample_series import ColumnStatistics
+from ..config.settings import Settings
 from ..deviation.load_spectrum import TipLoad, TipLoadFinder
 from ..health.alarms import Alarms, evidence_with_cause
 from ..predictions import Clock
 from ..system.received_files import sha256_of
-from ..twin.blocks import CODES, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined
-from ..types import NANO, USUAL_STREAMS, Alarm, Array, Health, Stream, StrokeReading, channels_of
+from ..twin.blocks import CODES, STREAMS, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined
+from ..types import NANO, SENSORS, USUAL_STREAMS, Alarm, Array, Health, Stream, StrokeReading, channels_of
 from .ground_truth import TipErrors
 
 STRETCH = 2**14  # predictions in a stretch, at least: 82 s at 200 Hz, some 30 MB
+MOST_STEPS = 64  # different differences of readings; noise that is not read out in coarse steps has more
 
 
 class ResidualRows(NamedTuple):
@@ -97,6 +99,33 @@ class SessionTotals:
             self.tip_sigma = max(self.tip_sigma or 0.0, float(np.hypot(*sigmas)))
 
 
+class ReadOut:
+    """Steps in which sensors are read out, by the differences of successive readings."""
+
+    def __init__(self) -> None:
+        self._steps: dict[int, set[float]] = {}  # by the code of their stream
+
+    def add(self, samples: SampleBlock) -> None:
+        """Add a block of samples."""
+        for code in np.unique(samples.streams).tolist():
+            steps = self._steps.setdefault(code, set())
+            if len(steps) <= MOST_STEPS:
+                apart = np.abs(np.diff(samples.values[samples.streams == code], axis=0))
+                steps.update(np.unique(np.round(apart[apart > 0.0], 9)).tolist())
+
+    def coarse(self, settings: Settings) -> dict[str, list[str]]:
+        """Return a sentence for each stream with steps q where q^2 / 12 exceeds the stated variance s^2 + r^2 / 12."""
+        found = []
+        for code, steps in self._steps.items():
+            kind, q = SENSORS[STREAMS[code]], min(steps, default=np.nan)
+            noise, stated = (getattr(settings, name) if name else np.inf for name in (kind.noise, kind.resolution))
+            is_even = len(steps) <= MOST_STEPS and all(abs(step / q - round(step / q)) < 1e-3 for step in steps)
+            if is_even and q**2 > 12.0 * noise**2 + stated**2:
+                told = f"{kind.title}: readings come in steps of {q:g} (SI units): set {kind.resolution} to that"
+                found.append(f"{told}, or sensors look stuck or noisy")
+        return {"read_out": found} if found else {}
+
+
 class Recording:
     """Recording of a replay's results, in the order of the session.
 
@@ -116,7 +145,7 @@ class Recording:
         self._parts: list[ReportBlock] = []
         self._health: list[Health] = []
         self._samples: list[SampleBlock] = []
-        self._alarms = Alarms()
+        self._alarms, self.read_out = Alarms(), ReadOut()
         self._newest: int | None = None
         self.first = 0  # stamp of the first prediction, ns
         self._count = self._before = 0  # predictions so far, and those in earlier stretches
@@ -131,6 +160,7 @@ class Recording:
 
     def add(self, rows: ReportBlock, samples: SampleBlock) -> None:
         self._samples.append(samples)
+        self.read_out.add(samples)
         self._parts.append(rows)
         held = {"leap", "late", "second source"}  # such samples were left out, unless a later report gives them
         for row, note in rows.notes.items():
@@ -259,8 +289,8 @@ def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
     drive = recording.reads.stream.value
     gaps = [Alarm(drive, "gap", start, end, None, f"for {(end - start) * NANO:.2f} s") for start, end in recording.gaps]
     gaps += [
-        Alarm(drive, "clock", start, start, None, f"stamps go on at {(end - first) * NANO:.3f} s")
-        for start, end in recording.clock_sets
+        Alarm(drive, "clock", start, start, None, f"stamps go on at {(end - first) * NANO:.3f} s{f', {n} times' * (n > 1)}")
+        for (start, end), n in Counter(recording.clock_sets).items()
     ]
     return [
         {

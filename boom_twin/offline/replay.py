@@ -247,6 +247,7 @@ def replay_into(
         SessionMetadata(__version__, given.kept.text, strokes=given.strokes.reading).write(out / "bag")
     file = out / "bag" / FILE_NAME if options.with_bag else None
     summary = summary_of(recording, twin.counts, wall, file) | clocks_of(twin.clocks) | given.summary
+    summary |= recording.read_out.coarse(twin.settings)
     if errors is not None:
         summary |= errors.rms
     write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")

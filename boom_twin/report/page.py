@@ -115,7 +115,7 @@ def _facts(found: Evaluation) -> list[tuple[str, object]]:
         *_uncertainty(recording),
         *((name, summary[key]) for key, name in AGAINST_TRUTH if key in summary),
         *([("load at the tip that the model does not know", summary["tip_load"])] if "tip_load" in summary else []),
-        *(("noise", told) for told in noise_as_text(summary)),
+        *(("noise", told) for told in [*summary.get("read_out", []), *noise_as_text(summary)]),
     ]
 
 

@@ -87,7 +87,7 @@ def read_csv_pieces(path: Path, error: type[BoomTwinError], layout: CsvLayout | 
     try:
         encoding = layout.encoding if layout else marked_encoding(path) or "utf-8"
         with path.open(encoding=encoding, newline="") as file:
-            lines = _Lines(file)
+            lines = _Lines(file, is_strict=layout is None)
             reader = csv.reader(lines, delimiter=layout.separator if layout else ",", skipinitialspace=layout is not None)
             found = ((reader.line_num, row) for row in reader if row)
             if layout is None:
@@ -116,17 +116,19 @@ def marked_encoding(path: Path) -> str:
 
 
 class _Lines:
-    """Iterator of the lines of a file; counts them and checks their lengths."""
+    """Iterator of the lines of a file; counts them and checks their lengths. Unless `is_strict`, one with NULs is one NUL."""
 
-    def __init__(self, file: TextIO) -> None:
-        self._file, self.number, self.is_ended = file, 0, True
+    def __init__(self, file: TextIO, is_strict: bool) -> None:
+        self._file, self._is_strict, self.number, self.is_ended = file, is_strict, 0, True
 
     def __iter__(self) -> Iterator[str]:
         while line := self._file.readline(LONGEST_LINE):
             self.number += 1
             self.is_ended = line.endswith(("\n", "\r"))
             if "\0" in line:
-                raise UnicodeError(f"a NUL in line {self.number}: UTF-16 or UTF-32 without a byte order mark?")
+                if self._is_strict:
+                    raise UnicodeError(f"a NUL in line {self.number}: UTF-16 or UTF-32 without a byte order mark?")
+                line = "\0\n"
             if len(line) == LONGEST_LINE and not self.is_ended:
                 raise csv.Error(f"line {self.number} is longer than {LONGEST_LINE} characters")
             yield line

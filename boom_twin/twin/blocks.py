@@ -252,7 +252,7 @@ EVENTS = {
     "gap": "longer pause between strokes, bridged",
     "restart": "pause too long to bridge, or strokes elsewhere after it; started again from rest",
     "stroke elsewhere": "a stroke jumped where its cylinder cannot go, and stayed there for a second; started from rest",
-    "leap": "stamp far from its stream; left out unless the next follows within `gap` (raise it for slow strokes)",
+    "leap": "stamp far from its stream; left out unless the next follows within `gap` (raise it below 10 Hz)",
     "clock set": "stamps went on elsewhere, strokes where they were; the model goes on, by the new stamps",
     "jump back": "time was set back, and strokes did not go on where they were; started again from rest",
     "second source": "samples of another source among those that are followed; left out",

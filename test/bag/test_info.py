@@ -70,6 +70,8 @@ def test_gaps_clocks_and_stamps(tmp_path: Path, capsys: pytest.CaptureFixture[st
     values = told(capsys, write(tmp_path / "gap", rows))
     assert values["largest_gaps_s"] + values["largest_gaps_at_s"] == pytest.approx([0.1, 0.02])
     assert values["stamps_not_increasing"] == [2]
+    for sentence in ("1 stamps step back, the first from 0.120 to 0.110 s", "1 stamps are that of the one before"):
+        assert any(sentence in told_missing for told_missing in values["missing_for_replay"])
     rows = [(Stream.STROKES, START + k * STEP, START + k * STEP - 2_000_000 - 1000 * k, ["cylinder_1"]) for k in range(11)]
     rows += [(Stream.STROKES, START + k * STEP, 0, ["cylinder_1"]) for k in range(11, 14)]
     rows += [(Stream.ANGLES, START + k * STEP, START + k * STEP - 200_000_000, ["joint_1"]) for k in range(11)]
@@ -78,6 +80,15 @@ def test_gaps_clocks_and_stamps(tmp_path: Path, capsys: pytest.CaptureFixture[st
         assert values[f"log_minus_stamp_{name}_s"] == pytest.approx([strokes, 0.2], abs=1e-12)
     assert values["stamps_unset"] == [3, 0]
     assert any("/joint_angles is stamped 0.198 s before its log time" in remark for remark in values["remarks"])
+
+
+def test_bursts_are_told_and_messages_of_single_sensors_are_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bursts = [START + k // 5 * 10 * STEP + k % 5 * 100_000 for k in range(200)]
+    rows: list[Row] = [(Stream.STROKES, START + k * STEP, stamp, ["cylinder_1"]) for k, stamp in enumerate(bursts)]
+    (sentence, *_) = told(capsys, write(tmp_path / "bursts", rows))["missing_for_replay"][1:]
+    assert "/cylinder_strokes: readings come in bursts of 5, 0.05 s apart" in sentence
+    rows = [(*row[:3], [f"cylinder_{k % 5 + 1}"]) for k, row in enumerate(rows)]  # each of a bus in messages of its own
+    assert "come in bursts" not in str(told(capsys, write(tmp_path / "bus", rows)))
 
 
 def test_a_driving_sensor_that_is_never_named_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -74,6 +74,13 @@ def rescue(tmp_path: Path, data: bytes, **options: Any) -> tuple[Recovery, Path]
     return outcome, out
 
 
+def test_bytes_that_are_missing_near_the_start_cost_the_first_chunk(real: tuple[bytes, list[Row]], tmp_path: Path) -> None:
+    """The only definitions left are in the summary, which is not where the footer says."""
+    outcome, out = rescue(tmp_path, real[0][:200] + real[0][4000:])
+    check(outcome, out, real[1])
+    assert outcome.lost is not None and 0 < sum(outcome.lost.values()) < 0.02 * len(real[1])
+
+
 def test_the_bundled_session_cut_and_with_flipped_bits(real: tuple[bytes, list[Row]], tmp_path: Path) -> None:
     random, data = np.random.default_rng(2), bytearray(real[0])
     for place in random.integers(0, len(data), 6):

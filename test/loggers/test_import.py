@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from datetime import UTC
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -183,7 +184,7 @@ def test_a_proposal_is_edited_and_given_back(tmp_path: Path, capsys: pytest.Capt
     assert sensors["joint_1"] == "none" and sensors["cylinder_1"]["zero"] == 12.5
 
 
-def test_rows_that_repeat_or_step_back_keep_their_order_and_stamps(tmp_path: Path) -> None:
+def test_rows_that_repeat_or_step_back_keep_their_order_and_stamps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     times = [0.00, 0.01, 0.02, 0.02, 0.01, 0.03, *(0.01 * k for k in range(4, 23)), *(0.01 * k for k in range(-495, -475))]
     rows = iter(times)
     text = table(["Zeit [s];" + ";".join(NAMES)], lambda _: f"{next(rows):.2f}", numbers(",", 4), rows=len(times))
@@ -193,6 +194,7 @@ def test_rows_that_repeat_or_step_back_keep_their_order_and_stamps(tmp_path: Pat
     assert [(stamp - shift) / 1e9 for stamp, _ in messages(tmp_path / "s")] == pytest.approx(times)
     logs = [log for _, log, _ in read(scan(tmp_path / "s"), {"cylinder_strokes": "sensor_msgs/msg/JointState"})]
     assert logs == sorted(logs) and logs[-1] - logs[0] == pytest.approx(0.42e9)
+    assert "2 stamps step back" in (told := capsys.readouterr().err) and "1 stamps are that of the one before" in told
 
 
 def test_the_hour_that_comes_twice_in_autumn_is_two_hours(tmp_path: Path) -> None:
@@ -216,6 +218,29 @@ def seconds(row: int) -> str:
 
 GOOD = table([HEAD], seconds, numbers(",", 4))
 GROUPED = table([HEAD], seconds, numbers(",", 3))
+TIMES = {  # unit, first stamp (ns), time of a row
+    "spreadsheet days": ("", AT_14, lambda row: f"{25569 + Decimal(AT_14 + 10_000_000 * row) / (86_400 * 10**9):.12f}"),
+    "given days": (" [d]", AT_14, lambda row: f"{25569 + Decimal(AT_14 + 10_000_000 * row) / (86_400 * 10**9):.12f}"),
+    "seconds since 1904": (" [s]", AT_14, lambda row: f"{Decimal(AT_14 + 10_000_000 * row) / 10**9 + 2_082_844_800}"),
+    "minutes and seconds": (
+        "",
+        3_599_500_000_000,
+        lambda row: f"{(59 + (595 + row) // 600) % 60:02d}:{(59.5 + 0.1 * row) % 60:06.3f}",
+    ),
+}
+
+
+@pytest.mark.parametrize("style", TIMES)
+def test_times_of_spreadsheets_and_labview(tmp_path: Path, style: str) -> None:
+    unit, first, time = TIMES[style]
+    (tmp_path / "log.csv").write_text(table([TIMELESS.replace("Zeit", f"Zeit{unit}")], time, numbers(digits=4)))
+    options = ["--timezone", "UTC", "--out", str(tmp_path / "s")]
+    assert main(["import", str(tmp_path / "log.csv"), *options]) == 0
+    stamps = np.array([stamp for stamp, _ in messages(tmp_path / "s")])
+    assert stamps[0] == pytest.approx(first, abs=1e5)
+    assert np.diff(stamps) == pytest.approx(1e7 if first == AT_14 else 1e8, abs=1e5)
+
+
 FAULTS = {
     "a word": (GOOD.replace("\n0.30;658,8000", "\n0.30;OVL"), "line 32: Zylinder 1 [mm] = 'OVL' is not a number"),
     "a word as time": (GOOD.replace("\n0.30;", "\nPause;"), "line 32: Zeit [s] = 'Pause' is not a time"),
@@ -225,9 +250,11 @@ FAULTS = {
     "no unit": (GOOD.replace(" [mm]", ""), "cylinder_1: no unit is given ('Zylinder 1' of"),
     "unknown unit": (GOOD.replace("[mm]", "[inkr]"), "unit inkr, not m, cm, mm, um, in)"),
     "two for one": (GOOD.replace("Zylinder 4", "Hub 3"), "cylinder_3: it may be 'Hub 3 [mm]' of"),
+    "equal names": (GOOD.replace("Zylinder 4", "Zylinder 3"), "\n  cylinder_3: several columns 'Zylinder 3 [mm]' of"),
     "one is missing": (GOOD.replace("Zylinder 3", "Kran"), "no column for cylinder_3. Not used: 'Kran [mm]'"),
     "two times": (GOOD.replace("Zylinder 4 [mm]", "Zeit [s]"), "several columns 'Zeit [s]'"),
     "no header": (GOOD.partition("\n")[2], "numbers stand in its first line"),
+    "numbers above": ("\n".join([*GOOD.splitlines()[1:20], GOOD]), "rows of numbers stand above the header in line 20. Cut"),
     "no table": ("nothing\nto see", "no table found. The file begins with 'nothing'"),
     "no time": (GOOD.replace("Zeit", "Nr"), "no column of times among"),
     "ms or s": (table([TIMELESS], lambda row: f"{0.15 * row:.2f}", numbers(",", 4)), "the times may be in s or ms"),
@@ -247,6 +274,37 @@ def test_what_cannot_be_known_is_refused_with_its_place(tmp_path: Path, fault: s
     assert words in capsys.readouterr().err and not (tmp_path / "s").exists()
 
 
+LINES = GOOD.splitlines()
+BETWEEN = {  # lines of files, and how many of them are no readings
+    "a comment": ([*LINES[:40], "pump on", *LINES[40:]], 1),
+    "a header": ([*LINES[:20], LINES[0], *LINES[20:50], "#EOF", LINES[0], *LINES[50:]], 3),
+    "a trailer": ([*LINES, "End of file"], 1),
+    "a power cut": ([*LINES[:40], "\0" * 900, *LINES[40:]], 1),
+    "channel numbers": ([HEAD.replace(" [mm]", ""), "1;2;3;4;5", "s;mm;mm;mm;mm", *LINES[1:]], 0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("between", BETWEEN)
+def test_lines_between_the_readings_cost_no_reading_and_are_told(
+    tmp_path: Path, between: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines, count = BETWEEN[between]
+    (tmp_path / "log.csv").write_text("\n".join([*lines, ""]))
+    assert main(["import", str(tmp_path / "log.csv"), "--out", str(tmp_path / "s")]) == 0
+    told = capsys.readouterr()
+    assert f"log.csv: {ROWS} rows, 0.590 s;" in told.out and ("lines left out" in told.err) == bool(count)
+    assert not count or f"repeated headers or NULs: {count}, the first is line " in told.err
+
+
+@pytest.mark.parametrize("second", [LINES[0].replace("4", "5"), LINES[0] + ";Winkel 1 [deg];Winkel 2 [deg]"])
+def test_blocks_of_other_columns_are_refused_with_the_line(
+    tmp_path: Path, second: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "log.csv").write_text("\n".join([*LINES[:20], second, *LINES[20:], ""]))
+    assert main(["import", str(tmp_path / "log.csv"), "--out", str(tmp_path / "s")]) == 1
+    assert "log.csv, line 21: another header, 'Zeit [s];Zylinder 1" in capsys.readouterr().err
+
+
 def test_files_without_a_common_time_and_parts_of_one_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     angles = table(["Zeit [s];Winkel 1 [deg]"], lambda row: f"{100 + 0.01 * row:.2f}", lambda _: ["1"])
     second = table([HEAD], lambda row: f"{0.6 + 0.01 * row:.2f}", numbers(",", 4))
@@ -262,6 +320,9 @@ def test_files_without_a_common_time_and_parts_of_one_recording(tmp_path: Path, 
     assert main(["import", b, a, *out, "--json"]) == 0
     told = capsys.readouterr()
     assert json.loads(told.out)["counts"] == [2 * ROWS] and "line 62 was cut off (2 of 5 cells) and is left out" in told.err
+    (tmp_path / "b.csv").write_text(second + "\0" * 900)  # the power was cut
+    assert main(["import", str(tmp_path / "b.csv"), "--out", str(tmp_path / "t")]) == 0
+    assert "line 62 was cut off (1 of 5 cells) and is left out" in capsys.readouterr().err
 
 
 def write_parquet(path: Path, times: np.ndarray, values: np.ndarray) -> None:

@@ -17,7 +17,9 @@ from default_boom import strokes_of_posture
 from recordings import scan, write_session
 
 from boom_twin import BagError, Settings, load_scene, replay
+from boom_twin.bag.session_file import WHOLE
 from boom_twin.monitor.data.bag_feed import bag_feed
+from boom_twin.offline.commissioning import wiring_of
 from boom_twin.offline.inputs import ReplayOptions
 from boom_twin.offline.replay import replay_into
 from boom_twin.system.result_folder import REPLAY, result_folder
@@ -55,6 +57,27 @@ def killed(session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     child.wait()
     assert not out.exists()
     return file.parents[1]
+
+
+@pytest.mark.parametrize(("value", "span"), [(np.nan, 1.0), (-9.999, 0.2)])
+def test_a_transducer_is_used_again_as_soon_as_its_readings_are_back(tmp_path: Path, value: float, span: float) -> None:
+    """It was left out for seconds more, while the boom moved on."""
+    times, found = 0.01 * np.arange(1000), []
+    strokes = np.tile(strokes_of_posture(load_scene(), "arch"), (1000, 1)) + np.random.default_rng(0).normal(
+        0.0, 2e-5, (1000, 4)
+    )
+    strokes[:, 0] -= 0.05 * (1.0 - np.cos(0.4 * np.pi * times))
+    is_lost = (times >= 5.0) & (times < 5.0 + span)
+    for name, readings in (("sound", strokes), ("lost", np.where(is_lost[:, None] & (np.arange(4) == 0), value, strokes))):
+        write_session(
+            tmp_path / name, START + 2 * STEP * np.arange(1000), readings, None, None, {"origin": "synthetic, a test"}
+        )
+        found.append(replay(tmp_path / name, None, tmp_path / f"{name}_out", with_bag=False).columns())
+    one, other = (columns["tip_y_m"][(times > 5.2 + span) & (times < 9.9)] for columns in found)
+    np.testing.assert_allclose(other, one, atol=0.01)
+    told = "100 readings missing, 0 beyond" if np.isnan(value) else "0 readings missing, 20 beyond"
+    assert wiring_of(tmp_path / "lost", None, None, WHOLE).startswith(f"cylinder_1: {told} the travel; else strokes are within")
+    assert "missing" not in wiring_of(tmp_path / "sound", None, None, WHOLE)
 
 
 @pytest.mark.system

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from recordings import SESSION_YAML as FILE_NAME
-from recordings import SessionMetadata
+from recordings import SessionMetadata, write_session
 
-from boom_twin import BagError, Settings, UsageError
+from boom_twin import BagError, Settings, UsageError, load_scene, replay
 from boom_twin.bag.session_model import settings_of
 from boom_twin.cli.output import open_session_settings
+from boom_twin.cli.replay import as_text
 from boom_twin.config.settings import Thresholds, load_thresholds
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
@@ -31,6 +34,19 @@ def test_the_parameters_are_those_of_the_node_that_was_recorded(tmp_path, capsys
         SessionMetadata("0", twin=wrong).write(tmp_path)
         with pytest.raises(BagError, match=rf"session\.yaml, twin: {next(iter(wrong))} .*--params"):
             settings_of(tmp_path)
+
+
+@pytest.mark.parametrize(("step", "told"), [(1e-3, True), (1e-6, False)])
+def test_coarse_readings_are_told_once_with_the_setting_that_says_so(tmp_path: Path, step: float, told: bool) -> None:
+    """Sensors that are read out in steps of 1 mm, as often on CAN, had dozens of alarms that did not name the setting."""
+    stamps, strokes = 5_000_000 * np.arange(1, 801), np.tile(strokes_of_posture(load_scene(), "arch"), (800, 1))
+    strokes += 0.01 * (1.0 - np.cos(np.pi * 1e-9 * stamps))[:, None] + np.random.default_rng(0).normal(0.0, 2e-5, (800, 4))
+    write_session(tmp_path / "bag", stamps, step * np.round(strokes / step), None, None, {"origin": "synthetic, a test"})
+    summary = replay(tmp_path / "bag", None, tmp_path / "out", with_bag=False).summary
+    lines = [line for line in as_text(summary) if "readings come in steps" in line]
+    assert len(lines) == told and (not told or "of 0.001 (SI units): set stroke_resolution" in lines[0])
+    settings = Settings(stroke_resolution=step)
+    assert "read_out" not in replay(tmp_path / "bag", None, tmp_path / "set", settings=settings, with_bag=False).summary
 
 
 BLOCKS = {

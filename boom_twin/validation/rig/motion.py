@@ -150,6 +150,8 @@ def through_postures(scene: Scene, postures: Sequence[str], duration: float, acc
     The undeformed boom's tip accelerates by at most `acceleration` (m/s^2). A single posture gives a boom that stands still.
     UsageError if moves and rest periods take longer than `duration` (s).
     """
+    if unknown := [posture for posture in postures if posture not in scene.postures]:
+        raise UsageError(f"--through: {unknown[0]!r} is no posture of the scene. Give names, of {', '.join(scene.postures)}.")
     stops = [strokes_of_posture(scene, posture) for posture in postures]
     spans = [_span(scene, one, other, acceleration) for one, other in pairwise(stops)]
     rest = (duration - sum(spans)) / len(stops)

@@ -88,3 +88,5 @@ def test_moves_through_postures_rest_in_each_and_keep_the_acceleration_of_the_ti
 def test_moves_that_take_longer_than_the_session_are_refused():
     with pytest.raises(UsageError, match="duration = 9 s"):
         through_postures(SCENE, ["arch", "low"], 9.0, 0.4)
+    with pytest.raises(UsageError, match=r"--through: '60' is no posture of the scene\. Give names, of "):
+        through_postures(SCENE, ["arch", "60", "30"], 60.0, 0.4)
