@@ -138,7 +138,7 @@ def step_models(p, f, h, y):
     if h > 0.0:
         steps = max(1, math.ceil(h / LONGEST_STEP - 1e-6))
         for mixture in range(mixtures):
-            interact(f, mixture, states_of(p, mixture), h, 0.0 if p.reads_angle else MEMORY)
+            interact(f, mixture, states_of(p, mixture), h, 0.0 if p.reads_angle or mixture == ESTIMATE else MEMORY)
         make_transition(p, f, h / steps)
         for mixture in range(mixtures):
             first, states = first_model(mixture), states_of(p, mixture)

@@ -209,6 +209,10 @@ class BoomPredictor:
         x = self.filters.strokes
         return np.asarray(x[:, 0] + span * (x[:, 1] + 0.5 * span * x[:, 2]))
 
+    def expected(self, readings: Array) -> Array:
+        """Return the newest of what drives the model (m or rad), shape (n,); of sensors that are left out these readings."""
+        return np.where(self.filters.deaf, readings, self.extrapolated(0.0))
+
     @property
     def speeds(self) -> Array:
         """Rates of what drives the model at the newest sample, as estimated, m/s or rad/s, shape (n,)."""

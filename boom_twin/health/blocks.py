@@ -82,13 +82,6 @@ def joined(parts: list[Rows]) -> Rows:
     return type(parts[0])(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
-def means_of(raw: Array) -> Array:
-    """Return the means of readings (k, channels); NaN of none."""
-    is_read = np.isfinite(raw)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(is_read, raw, 0.0).sum(axis=0) / is_read.sum(axis=0))
-
-
 def by_block(rows: Rows) -> Iterator[tuple[int, Rows]]:
     """Yield the number of every block that has rows, and these."""
     numbers = rows.stamps // BLOCK

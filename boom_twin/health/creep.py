@@ -15,7 +15,6 @@ from ..scene.kinematics import strokes_of_angles
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Stream
 from .alarms import change_text
-from .blocks import means_of
 
 SPAN, PARTS = 12, 4  # s of a window, several periods of a pump; equal parts of it whose means are compared
 UNEVEN = 0.4  # largest relative difference of the rates between parts, and of the rates by length and by angle
@@ -43,9 +42,9 @@ class CreepMonitor:
         if self._seconds and stamp - self._seconds[-1][0] != SECOND:
             self._seconds.clear()
         count, codes = len(self._scene.joints), list(Stream)
-        lengths, angles = (
-            means_of(block.values[block.streams == codes.index(stream), :count]) for stream in (Stream.STROKES, Stream.ANGLES)
-        )
+        both = (block.values[block.streams == codes.index(stream), :count] for stream in (Stream.STROKES, Stream.ANGLES))
+        with np.errstate(invalid="ignore"):  # means of no readings are NaN
+            lengths, angles = (np.nansum(rows, axis=0) / np.isfinite(rows).sum(axis=0) for rows in both)
         self._seconds.append((stamp, np.stack([lengths, strokes_of_angles(self._scene, angles)])))
         begun = self._begun(stamp + SECOND)
         ended = [replace(self._alarms.pop(i), until=stamp) for i in [*self._alarms] if i not in self.creeping]

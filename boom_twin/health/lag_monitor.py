@@ -1,7 +1,7 @@
 """Monitor of the lags of all streams behind the strokes, by the estimator of the commissioning check.
 
-A lag is reported if it explains most of what readings are off the prediction, beside the deviation that is stated of this, and
-its size is known to a tenth. If all other streams are early by the same time, the strokes are late.
+A lag is reported if it explains most residuals beyond their stated deviation, and its size is known to a tenth. If all other
+streams are early by the same time, the strokes are late.
 """
 
 from __future__ import annotations

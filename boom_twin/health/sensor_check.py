@@ -91,8 +91,7 @@ class SensorFindings(NamedTuple):
 class StreamReadings(NamedTuple):
     """A block of k readings.
 
-    means : (4, channels) of readings that have a prediction, of these predictions, of the variances of their differences, and
-    of all readings; NaN of none.
+    means : (4, channels) of readings with a prediction, these predictions, variances of both, and all readings; NaN of none.
     is_bent : True if trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by
     second and by third differences, motion much less by third ones.
     """

@@ -20,7 +20,7 @@ from ..wiring.check import Checked, channel_name, check, likely
 from ..wiring.readings import Channel, RestModel, Series, Window, is_checked
 from .alarms import UNKNOWN
 from .blocks import Block
-from .sensor_check import Readings
+from .sensor_check import Flags, Readings
 
 KIND = "wiring"  # kind of all its alarms
 SCENE = "scene"  # channel and cause of the alarm that the scene is of another boom
@@ -100,9 +100,7 @@ class WiringMonitor:
         is_of_reading = alarm.kind in {"range", "jump", "noise", "spikes", "intermittent"}
         return is_of_reading and alarm.channel in self._chosen(self._wrong | self._doubted)
 
-    def take(
-        self, block: Block, strokes: Array, readings: Readings, failing: Mapping[Stream, NDArray[np.bool_]]
-    ) -> list[Alarm]:
+    def take(self, block: Block, strokes: Array, readings: Readings, failing: Mapping[Stream, Flags]) -> list[Alarm]:
         """Take a block with its mean strokes (n,) in m; return the alarms that began or ended.
 
         Channels that are `failing` by themselves are left out once their wiring is known to be right.

@@ -201,7 +201,7 @@ class SampleTaker:
         if run is None:
             return self._follow(sample, values, complete, [])
         if line.is_next(sample.stamp) and sample.stamp - run.newest >= SHORTEST_STEP:
-            if run.is_of_others(sample.stamp - run.epoch, values, self._boom.extrapolated(0.0), self._compiled.limits):
+            if run.is_of_others(sample.stamp - run.epoch, values, self._boom.expected(values), self._compiled.limits):
                 return self._refuse(sample, "implausible")
             return self._follow(sample, values, complete, [])
         verdict = verdict_on(sample, line, run, self._boom, self._compiled.limits, self.settings, self._zeroed)
@@ -287,7 +287,7 @@ class SampleTaker:
 
     def _step(self, run: Run, sample: Sample, events: list[str]) -> ReportBlock:
         self._lines[self._drive].take(sample.stamp)
-        estimate = self._boom.extrapolated(0.0) if run.is_predicted else None
+        estimate = self._boom.expected(sample.values) if run.is_predicted else None
         before, rates = self._state.strokes, self._boom.speeds
         taken, oddities = run.checked(sample.stamp - run.epoch, sample.values, before, estimate, rates, self._compiled.limits)
         if run.must_restart and np.isfinite(sample.values).all():

@@ -42,8 +42,8 @@ def test_it_is_reported_and_not_used(case: str) -> None:
     alarms = {(alarm.channel, alarm.kind, alarm.cause) for time, alarm in found.states() if time > 4.0}
     assert alarms == {(channel, "wiring", f"{channel}.sensor") for channel in channels}
     assert any(told in alarm.evidence and "mapping --check" in alarm.told for _, alarm in found.states())
-    if stream is not Stream.STROKES:
-        np.testing.assert_allclose(tips(found)[800:], tips(right)[800:], atol=6e-3)
+    most = 0.25 if stream is Stream.STROKES else 6e-3  # angle sensors take the place of strokes; without them it is 2 m
+    np.testing.assert_allclose(tips(found)[800:], tips(right)[800:], atol=most)
 
 
 def test_what_is_not_determined_is_not_almost_certain() -> None:
