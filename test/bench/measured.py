@@ -41,7 +41,7 @@ beams, 16 and 32 elements a section. All sessions are synthetic and all paramete
 equations are solved rightly, not that a real boom behaves so.
 
 {run} `make measured` writes this page. Other rows name the day and the commit
-of their last record in the docs; the rows of live nodes and pages are of version 0.1.
+of their last record in the docs; the rows of live pages are of version 0.1.
 Named tests hold the bounds. Run times depend on the machine: repeat them on yours.
 """
 FOOT = """
