@@ -110,9 +110,9 @@ def add_motion(p, covariance, speed, swing):
     """Add the variances of drives that may move at `speed` (m/s), and of a tip that may vibrate by `swing` (m)."""
     n, m, drive = p.drives.shape[0], p.modes[0], drive_place(p)
     for j in range(m):
-        omega2, off2 = p.omega[j] * p.omega[j], 0.0
-        if j == 0:
-            off2 = swing * swing / max(reach2(p, 2 + n), 1e-9)
+        omega2, motion2, off2 = p.omega[j] * p.omega[j], reach2(p, 2 + n + j), 0.0
+        if j == 0 and motion2 > 0.0:
+            off2 = swing * swing / motion2
         for i in range(n):
             off2 += (p.forces[2 + n + j, i] * speed) ** 2 / (omega2 * omega2 * omega2)
         covariance[j, j] += off2
@@ -138,7 +138,9 @@ def step_models(p, f, h, y):
     if h > 0.0:
         steps = max(1, math.ceil(h / LONGEST_STEP - 1e-6))
         for mixture in range(mixtures):
-            interact(f, mixture, states_of(p, mixture), h, 0.0 if p.reads_angle or mixture == ESTIMATE else MEMORY)
+            # other sensors, or angles, tell soon whether a valve has opened
+            memory = 0.0 if p.reads_angle or mixture == ESTIMATE else MEMORY
+            interact(f, mixture, states_of(p, mixture), h, memory)
         make_transition(p, f, h / steps)
         for mixture in range(mixtures):
             first, states = first_model(mixture), states_of(p, mixture)
