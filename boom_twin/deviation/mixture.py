@@ -10,7 +10,7 @@ from .states import ALL_VALVES, BURST, ESTIMATE, IS_OLD, OPEN, PREDICTION, VALVE
 MODELS = BURST + 1  # of a mixture
 LEAST_CHANCE = 1e-60  # of a model, so that none is 0: the rates let it grow again, but for a load while a valve is open
 OPENS, CLOSES = 0.3, 1.0  # 1/s, rates at which valves open, and are closed again
-MEMORY = 0.5  # s, in which valves that opened are remembered, see `interact`
+MEMORY = 0.1  # s, in which valves that opened are remembered, see `interact`
 COMES, STAYS = 0.2, 1.0  # 1/s, rates at which a load comes while all valves are closed, and is usual again
 
 
