@@ -88,9 +88,8 @@ class Tally:
                 self._compare(log_time - stamp)
                 sensors = data[SENSORS_IN]
                 self._sensors = self._sensors or sensors
-                if (
-                    sensors == self._sensors and len(self.stamps) < MOST_TOGETHER
-                ):  # on a bus, each sensor has messages of its own
+                # on a bus, each sensor has messages of its own
+                if sensors == self._sensors and len(self.stamps) < MOST_TOGETHER:
                     self.stamps.append(stamp)
             else:
                 self.unset += 1

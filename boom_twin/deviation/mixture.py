@@ -101,21 +101,21 @@ def between(shares, two, three):
 
 @inner
 def mix_means(f, mixture, size):
-    """Write the mean of a mixture."""
+    """Write the mean of a mixture; return what `apart` does."""
     first, mean = first_model(mixture), f.mean[mixture]
     two, three = apart(f, first, size)
     for i in range(size):
         mean[i] = f.x[first, i] + f.chances[first + 1] * two[i] + f.chances[first + 2] * three[i]
+    return two, three
 
 
 @kernel
 def mix(f, mixture, size):
     """Write mean and covariance of a mixture."""
-    mix_means(f, mixture, size)
+    two, three = mix_means(f, mixture, size)
     f.status[IS_OLD] *= mixture != ESTIMATE
     first, spread, width = first_model(mixture), f.spread[mixture], whole(size)
     shares = f.chances[first : first + MODELS]
-    two, three = apart(f, first, size)
     for i in range(size):
         to_two, to_three = between(shares, two[i], three[i])
         line, by_one, by_two, by_three = spread[i], f.p[first, i], f.p[first + 1, i], f.p[first + 2, i]

@@ -66,11 +66,11 @@ MOST_EXCESS = 1e6  # times the variance that a channel is stated to have
 
 
 @kernel
-def start_models(p, f, speed, swing, at_work):
+def start_models(p, f, speed, swing, may_move):
     """Start at rest at the drives of the posture.
 
-    With all valves open, drives may move at `speed` (m/s) and the tip may vibrate by `swing` (m). If the boom is `at_work`, all
-    models allow for that.
+    In the model of open valves drives may move at `speed` (m/s), and the tip may vibrate by `swing` (m); in all models if the
+    boom `may_move`.
     """
     n, m, size = p.drives.shape[0], p.modes[0], all_states(p)
     load, drive = force_place(p), drive_place(p)
@@ -89,12 +89,12 @@ def start_models(p, f, speed, swing, at_work):
         x[drive + i] = p.drives[i]
         covariance[drive + i, drive + i] = f.noise.length2 * first_scale(p, i)
         covariance[drive + n + i, drive + n + i] = CLOSED_RATE * CLOSED_RATE
-        f.jerk[i], f.is_open[PREDICTION, i], f.still[PREDICTION, i] = JERK, 1 if at_work else 0, 0.0
+        f.jerk[i], f.is_open[PREDICTION, i], f.still[PREDICTION, i] = JERK, 1 if may_move else 0, 0.0
         f.length2[i], f.pulls[i] = noise.length2, p.pulled[i]
         f.before[i, 0] = f.before[i, 1] = f.before[i, 2] = math.nan
     copy_model(f, VALVES, OPEN, size)
     add_motion(p, f.p[OPEN], speed, swing)
-    if at_work:
+    if may_move:
         copy_model(f, OPEN, VALVES, size)
     copy_model(f, VALVES, BURST, size)
     f.chances[VALVES], f.chances[OPEN], f.chances[BURST] = 0.8, 0.1, 0.1

@@ -159,7 +159,7 @@ class BoomPredictor:
         Parameters
         ----------
         may_move : bool
-            Whether the boom may be at work already: the covariance then allows for it.
+            Whether the boom may be at work already. Then all models allow for it, else only that of open valves.
 
         Raises
         ------

@@ -58,9 +58,9 @@ class Filters(NamedTuple):
     readings, their rates, and mean squares of their second derivatives.
     bends : (sites, 2) accelerations that sites have by their curved ways, m/s^2. ways : (n + 1, 7) those of pivots and tip (2),
     rates (rad/s), angular accelerations by linkages, and about rest (rad/s^2) of the chords behind them, accelerations that
-    pivots and tip have by these off their places at rest (2). swing : (m,) modal
-    forces by these, inputs : (2 m,) changes of modal coordinates and rates in a step by them. sway2 : (n,) square of the
-    largest angle by which an inclinometer lately erred, rad^2.
+    pivots and tip have by these off their places at rest (2). swing : (m,) modal forces by these. inputs : (2 m,) changes of
+    modal coordinates and rates in a step by them. sway2 : (n,) square of the largest angle by which an inclinometer lately
+    erred, rad^2.
     modal, transition : (m, 6), (p, p) part of the modes in the transition matrix, and its transpose. variances : (s,) of its
     noise.
     motion : (sites, 9) predicted x, y, angle of every site, m and rad, their rates, their accelerations.

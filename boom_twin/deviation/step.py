@@ -132,7 +132,7 @@ def write_prediction(t, boom, live, p, f, h, gravity, out):
         found.lengths[i] = estimates.strokes[i] + (p.compliance[i] - p.oil_read[i]) * elastic
         if not p.reads_angle:
             estimates.variances[i] = variance_of(f.row, f.spread[PREDICTION], f.gain, size)
-            f.strokes[i, 0], f.strokes[i, 1] = estimates.strokes[i], stroke_rate(p, f, i)
+            f.strokes[i, 0], f.strokes[i, 1] = estimates.strokes[i], rate_of(p, f.row, f.mean[PREDICTION])
             f.strokes[i, 2] = f.mean[PREDICTION, drive_place(p) + 2 * n + i]
     for k in range(pins):
         row = t.clearances[k]
@@ -187,14 +187,13 @@ def move_sites(t, boom, live, p, f, h, gravity):
 
 
 @inner
-def stroke_rate(p, f, i):
-    """Return the rate of what the stroke transducer of cylinder `i` reads, m/s."""
-    n, m, drive = p.drives.shape[0], p.modes[0], drive_place(p)
-    rate = p.drive_read[i] * f.mean[PREDICTION, drive + n + i]
-    for k in range(n):
-        rate += p.oil_read[i] * p.forces[2 + k, i] * f.mean[PREDICTION, drive + n + k]
+def rate_of(p, row, x):
+    """Return the rate at state `x` of what a row of coordinates and drives reads; the load is held."""
+    n, m, drive, rate = p.drives.shape[0], p.modes[0], drive_place(p), 0.0
     for j in range(m):
-        rate += p.oil_read[i] * p.forces[2 + n + j, i] * f.mean[PREDICTION, m + j]
+        rate += row[j] * x[m + j]
+    for k in range(n):
+        rate += row[drive + k] * x[drive + n + k]
     return rate
 
 

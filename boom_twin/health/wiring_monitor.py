@@ -82,7 +82,7 @@ class WiringMonitor:
         return self._is_other_boom or bool(self._wrong[self._own[Stream.STROKES]].any())
 
     def wrong(self, stream: Stream) -> NDArray[np.bool_]:
-        """Return the channels of a stream that are not read as declared, shape (channels,) or (); all with another boom."""
+        """Return the channels of a stream not read as declared, shape (channels,) or (); with another boom all but strokes."""
         return self._of(stream, self._wrong) | (self._is_other_boom and stream is not Stream.STROKES)
 
     def doubted(self, stream: Stream) -> NDArray[np.bool_]:

@@ -19,14 +19,19 @@ def eased(times, seconds):
     return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
 
 
+def measured(scene, times, strokes, rng):
+    """The motion of a boom by its drives, and its lengths with noise."""
+    boom = simulate(scene, times, strokes, estimate_errors=False)
+    return boom, boom.lengths + rng.normal(0.0, 2e-5, boom.lengths.shape)
+
+
 @pytest.mark.parametrize(("cylinder", "travel", "seconds"), [(4, -0.04, 1.0), (1, 0.05, 1.5), (3, 0.03, 1.0)])
 def test_a_quick_start_is_no_load(cylinder, travel, seconds, tmp_path):
     scene, rng = load_scene(), np.random.default_rng(5)
     times = np.arange(0.0, 6.0, 0.005)
     strokes = np.tile(statics(scene, "arch").strokes, (len(times), 1))
     strokes[:, cylinder - 1] += travel * eased(times, seconds)
-    boom = simulate(scene, times, strokes, estimate_errors=False)
-    lengths = boom.lengths + rng.normal(0.0, 2e-5, boom.lengths.shape)
+    boom, lengths = measured(scene, times, strokes, rng)
     rows = {"t_s": times} | {f"cylinder_{i + 1}": column for i, column in enumerate(lengths.T)}
     found = replay(rows, scene, tmp_path / "out", with_bag=False)
     columns = found.columns()
@@ -40,8 +45,7 @@ def test_three_valves_that_open_at_once_are_no_load(tmp_path):
     scene, rng = load_scene(Z_FOLD), np.random.default_rng(7)
     times = np.arange(0.0, 6.0, 0.005)
     strokes = statics(scene, "folded").strokes + np.outer(eased(times, 1.5), [0.1, 0.0, -0.02, 0.0, -0.012])
-    boom = simulate(scene, times, strokes, estimate_errors=False)
-    lengths = boom.lengths + rng.normal(0.0, 2e-5, boom.lengths.shape)
+    boom, lengths = measured(scene, times, strokes, rng)
     rows = {"t_s": times} | {f"cylinder_{i + 1}": column for i, column in enumerate(lengths.T)}
     columns = replay(rows, scene, tmp_path / "out", with_bag=False).columns()
     tip = np.column_stack([columns["tip_x_m"], columns["tip_y_m"]])
@@ -53,8 +57,7 @@ def test_forces_keep_the_estimate_right_where_lengths_take_a_move_for_a_load():
     scene, rng = load_scene(Z_FOLD), np.random.default_rng(7)
     times = np.arange(0.0, 6.0, 0.005)
     strokes = statics(scene, "folded").strokes + np.outer(eased(times, 0.9), [0.0, 0.0, -0.0113, 0.0, -0.0046])
-    boom = simulate(scene, times, strokes, estimate_errors=False)
-    lengths = boom.lengths + rng.normal(0.0, 2e-5, boom.lengths.shape)
+    boom, lengths = measured(scene, times, strokes, rng)
     forces = boom.cylinder_forces + rng.normal(0.0, 500.0, boom.cylinder_forces.shape)
     twin, errors = Twin(scene), []
     for k, stamp in enumerate((SECOND + np.round(times * SECOND)).astype(int).tolist()):
@@ -71,8 +74,7 @@ def test_valves_that_open_one_after_the_other_are_remembered():
     strokes = np.tile(statics(scene, "folded").strokes, (len(times), 1))
     strokes[:, 0] += 0.092 * eased(times, 2.0)
     strokes[:, 4] += 0.0043 * eased(times + 0.2, 1.0)
-    boom = simulate(scene, times, strokes, estimate_errors=False)
-    lengths = boom.lengths + rng.normal(0.0, 2e-5, boom.lengths.shape)
+    boom, lengths = measured(scene, times, strokes, rng)
     twin = Twin(scene)
     for k, stamp in enumerate((SECOND + np.round(times * SECOND)).astype(int).tolist()):
         found = twin.update(Sample(Stream.STROKES, stamp, lengths[k])).prediction.tip_position - boom.tip[k, :2]
@@ -83,8 +85,7 @@ def test_a_twin_that_starts_while_the_boom_moves_follows_it():
     scene, rng = load_scene(), np.random.default_rng(7)
     times = np.arange(0.0, 8.0, 0.005)
     strokes = statics(scene, "arch").strokes + np.outer(eased(times + 2.0, 5.0), [0.1, -0.03, 0.03, 0.03])
-    boom = simulate(scene, times, strokes, estimate_errors=False)
-    lengths, twin = boom.lengths + rng.normal(0.0, 2e-5, boom.lengths.shape), Twin(scene)
+    (boom, lengths), twin = measured(scene, times, strokes, rng), Twin(scene)
     for k in range(500, len(times)):
         report = twin.update(Sample(Stream.STROKES, SECOND + round(times[k] * SECOND), lengths[k]))
         assert times[k] < 3.5 or np.abs(report.prediction.tip_position - boom.tip[k, :2]).max() < 0.005
