@@ -12,6 +12,7 @@ from .states import PREDICTION, drive_place, force_place, whole, zero_place
 FAST, SLOW = 0.1, 60.0  # s, time constants of the two parts of the load
 QQ, QV, QF, VQ, VV, VF = range(6)  # shares in coordinate and rate of a mode after a step: of both before, and of a force
 DRIVE_TIME = 0.12  # s, correlation time of a drive's acceleration
+MOVE_TIME = 3.0  # s, correlation time of the rate of a drive whose transducer is left out: how long a move lasts
 LEAK = 1e-14  # m^2/s, random walk of a drive
 ANGLE_ZERO, ANGLE_DRIFT = 2e-4, 1e-5  # rad; rad in a root second: sensors' zeros, and the error of the model's statics
 GAINS = 4  # that correct a covariance at once, so that it is read and written once for all
@@ -153,9 +154,10 @@ def propagate(p, f, h, lines, width):
     kept = math.exp(-h / DRIVE_TIME)
     for i in range(n):
         drives, rate, acceleration = lines[drive + i], lines[drive + n + i], lines[drive + 2 * n + i]
+        lasting = math.exp(-h / MOVE_TIME) if f.deaf[i] else 1.0
         for k in range(width):
             drives[k] += h * rate[k] + 0.5 * h * h * acceleration[k]
-            rate[k] += h * acceleration[k]
+            rate[k] = lasting * rate[k] + h * acceleration[k]
             acceleration[k] *= kept
 
 

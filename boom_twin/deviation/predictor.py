@@ -237,14 +237,17 @@ class BoomPredictor:
     def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
         """Leave masked channels (c,) out of the estimate, and strokes (n,) out of all; restart the estimate if any are new.
 
-        The prediction takes the angle sensor of the joint in the place of a stroke that is left out.
+        The prediction takes the angle sensor of the joint in the place of a stroke that is left out. Without one the drive
+        stays where it was believed, and how far it may have moved since grows.
         """
         f, first, n = self.filters, drive_place(self.posture), self.plan.joints
         for i in np.flatnonzero(strokes & ~f.deaf):
             f.is_open[:, i] = 1
-            for covariance in f.p:
+            for x, covariance in zip(f.x, f.p, strict=True):
+                for at in (first + n + i, first + 2 * n + i):  # its rate and acceleration
+                    x[at] = covariance[at] = covariance[:, at] = 0.0
                 covariance[first + i, first + i] += FAILED_WAY**2
-                covariance[first + n + i, first + n + i] += FAILED_RATE**2
+                covariance[first + n + i, first + n + i] = FAILED_RATE**2
         if (masked & ~f.masked).any() or (strokes != f.deaf).any():
             f.status[FED] = 0
         f.masked[:], f.deaf[:] = masked, strokes

@@ -39,18 +39,34 @@ def test_more_samples_a_second_are_better(name):
 
 def test_the_angle_sensor_of_the_joint_replaces_a_transducer_that_sticks():
     """Cylinder 4 sticks at rest, is found when it moves, and the tip is right again a second after that."""
-    session, twin, tips = measured("rests"), Twin(load_scene(), health=True), {}
+    at, error, _ = error_of_a_stuck_cylinder(3, 1200, has_angles=True)
+    assert np.abs(error[at > 7.5]).max() < 5e-3
+
+
+@pytest.mark.parametrize(("cylinder", "first"), [(0, 700), (3, 1700)])
+def test_a_transducer_that_sticks_in_a_move_and_that_nothing_replaces_leaves_the_tip_unknown(cylinder, first):
+    at, error, sigmas = error_of_a_stuck_cylinder(cylinder, first, has_angles=False)
+    late = at > first / 200.0 + 1.0
+    assert np.abs(error[late]).max() > 0.2
+    assert (np.abs(error[late]) < 3.0 * sigmas[late]).all()
+
+
+def error_of_a_stuck_cylinder(cylinder, first, has_angles):
+    """Times (s), errors (m) of the estimated tip and their stated deviations, where a transducer sticks from sample `first`."""
+    session, twin, tips, sigmas = measured("rests"), Twin(load_scene(), health=True), {}, []
     times, boom = true_motion("rests")
     stuck = session.strokes.copy()
-    stuck[1200:, 3] = stuck[1200, 3]
+    stuck[first:, cylinder] = stuck[first, cylinder]
     for stamp, strokes, joints in zip(session.stamps.tolist(), stuck, session.joints, strict=True):
-        prediction = twin.update(Sample(Stream.STROKES, stamp, strokes)).prediction
-        twin.update(Sample(Stream.ANGLES, stamp, joints))
-        assert prediction is not None
-        tips[stamp] = prediction.tip_position
+        report = twin.update(Sample(Stream.STROKES, stamp, strokes))
+        if has_angles:
+            twin.update(Sample(Stream.ANGLES, stamp, joints))
+        assert report.prediction is not None and report.estimate is not None
+        tips[stamp] = report.prediction.tip_position if has_angles else report.estimate.tip[:2]
+        sigmas.append(np.sqrt(report.estimate.tip_covariance[[0, 3]]))
     at = np.array(list(tips)) / SECOND - 100.0
     error = np.array(list(tips.values())) - np.column_stack([np.interp(at, times, column) for column in boom.tip[:, :2].T])
-    assert np.abs(error[at > 7.5]).max() < 5e-3
+    return at, error, np.array(sigmas)
 
 
 @pytest.mark.parametrize(("name", "rate"), [("stops", 50.0), ("sweep", 50.0), ("12 Hz", 50.0)])
