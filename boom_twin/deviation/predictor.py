@@ -234,8 +234,10 @@ class BoomPredictor:
 
     # -- changes by the twin
 
-    def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
+    def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_], angles: NDArray[np.bool_]) -> None:
         """Leave masked channels (c,) out of the estimate, and strokes (n,) out of all; restart the estimate if any are new.
+
+        `angles` (n,) are those known to be wrong. Others that are left out contradict the strokes, and either may be wrong.
 
         The prediction takes the angle sensor of the joint in the place of a stroke that is left out. Without one the drive
         stays where it was believed, and how far it may have moved since grows.
@@ -251,7 +253,8 @@ class BoomPredictor:
         if (masked & ~f.masked).any() or (strokes != f.deaf).any():
             f.status[FED] = 0
         f.masked[:], f.deaf[:] = masked, strokes
-        f.apart[masked[:n] | strokes] = 0.0  # angle sensors are the first channels
+        f.settled[:] = angles | strokes
+        f.apart[f.settled] = 0.0
 
     def doubt(self, channels: Collection[str]) -> None:
         """Allow a large drift of the zeros of these sensors alone: angles, forces, axes of the IMU."""

@@ -48,8 +48,11 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
     age = (newest - stamp) * 1e-9  # s
     last, errors, lag = first, 0, p.channels[first].lag
     while last < p.channels.shape[0] and p.channels[last].stream == stream:
-        if math.isfinite(residuals[last - first]) and not f.masked[last]:
-            errors = max(errors, p.channels[last].last + 1, lag + 2)
+        residual, channel = residuals[last - first], p.channels[last]
+        if math.isfinite(residual) and not f.masked[last]:
+            errors = max(errors, channel.last + 1, lag + 2)
+        if math.isfinite(residual) and channel.kind == READS_ANGLE and not f.settled[channel.index]:
+            f.apart[channel.index] += LEARN_RATIO * (residual - f.apart[channel.index])
         last += 1
     if errors == 0 or age > OLDEST:
         return
@@ -89,10 +92,8 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         if lag >= 0:
             variance += add_lag(p, f, lag, f.row, f.rows[2])
         count = take_reading(p, f, c, count, residual, variance)
-        if channel.kind == READS_ANGLE:
-            f.apart[channel.index] += LEARN_RATIO * (residual - f.apart[channel.index])
-            if f.deaf[channel.index]:
-                replace_length(p, f, c, residual)
+        if channel.kind == READS_ANGLE and f.deaf[channel.index]:
+            replace_length(p, f, c, residual)
     for k in range(MODELS):
         take_gains(f.p[ALL_VALVES + k], f.gains[k], count, all_states(p))
     f.taken[stream] = stamp

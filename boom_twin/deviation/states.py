@@ -51,7 +51,8 @@ class Filters(NamedTuple):
     excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
     drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
     m^2. before, interval : (n, 3), (2,) the three lengths before (m); times between the newest two, and of `weights`, s.
-    apart : (n,) recent mean of what angle sensors read more than the lengths make of them, rad; 0 of sensors left out.
+    apart : (n,) recent mean of what angle sensors read more than the lengths make of them, rad. settled : (n,) joints of which
+    the stroke or the angle is known to be wrong; 0 of these.
     lags, late : (streams,) by which stamps are late, as estimated, and by which samples arrived after their stamps at most, s.
     copies : (c,) places of late channels among the copies of one instant, -1 of others. instants : (DELAYED,) stamps of copies,
     see `delayed`. taken : (streams,) stamps of the newest samples that corrected the estimate, ns. curves : (c, 3) expected
@@ -98,6 +99,7 @@ class Filters(NamedTuple):
     inputs: Array
     sway2: Array
     apart: Array
+    settled: NDArray[np.bool_]
     lags: Array
     late: Array
     taken: NDArray[np.int64]
@@ -139,7 +141,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
         ways=np.zeros((n + 1, 7)), swing=np.zeros(modes), inputs=np.zeros(2 * modes),
-        sway2=np.zeros(n), apart=np.zeros(n), lags=np.zeros(len(Stream)), noise=noise,
+        sway2=np.zeros(n), apart=np.zeros(n), settled=np.zeros(n, np.bool_), lags=np.zeros(len(Stream)), noise=noise,
         late=np.zeros(len(Stream)), taken=np.zeros(len(Stream), np.int64), curves=np.zeros((channels, 3)),
         copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         modal=np.zeros((modes, 6)), transition=vectors(own, whole(own)), turned=vectors(own, whole(own)),

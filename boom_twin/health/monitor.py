@@ -116,6 +116,12 @@ class HealthMonitor:
         """Return which sensors of those that drive the model give wrong readings or are wired otherwise, shape (n,)."""
         return self._sensors[self._drive].unusable | self._wiring.wrong(self._drive)
 
+    @property
+    def wrong_angles(self) -> NDArray[np.bool_]:
+        """Return which angle sensors are known to be wrong, shape (n,). One that contradicts its stroke alone is not."""
+        stream = Stream.ANGLES
+        return self._sensors[stream].masked | self._wiring.found_wrong_angles | self._lags.is_late(stream)
+
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
         """Return which channels of a stream are not compared with the prediction."""
         masked = self._sensors[stream].masked | self._wiring.wrong(stream)

@@ -69,7 +69,7 @@ class WiringMonitor:
         self._age, self._searched, self._is_other_boom = 0, False, False
         self._model: RestModel | None = None
         self._search: tuple[int, Future[Checked | None]] | None = None
-        self._wrong, self._doubted, self._right = np.zeros((3, len(self._names)), bool)
+        self._wrong, self._doubted, self._right, self._found = np.zeros((4, len(self._names)), bool)
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -84,6 +84,11 @@ class WiringMonitor:
     def wrong(self, stream: Stream) -> NDArray[np.bool_]:
         """Return the channels of a stream not read as declared, shape (channels,) or (); with another boom all but strokes."""
         return self._of(stream, self._wrong) | (self._is_other_boom and stream is not Stream.STROKES)
+
+    @property
+    def found_wrong_angles(self) -> NDArray[np.bool_]:
+        """Return which angle sensors are read otherwise for sure, and then agree with the strokes without another zero."""
+        return self._of(Stream.ANGLES, self._wrong & self._found)
 
     def doubted(self, stream: Stream) -> NDArray[np.bool_]:
         """Return the channels of a stream not read as declared, while it is looked for how, shape (channels,) or ()."""
@@ -163,7 +168,9 @@ class WiringMonitor:
             is_wrong = (
                 verdict.is_wrong and verdict.is_explained and (verdict.has_no_gravity or verdict.best != verdict.declared)
             )
-            self._wrong[self._names.index(verdict.channel)] = is_wrong
+            place, read = self._names.index(verdict.channel), verdict.best
+            self._wrong[place] = is_wrong
+            self._found[place] = verdict.is_sure and read is not None and read.zero == verdict.declared.zero
             name = channel_name(verdict)
             is_told = is_wrong and not found.is_other_boom
             if is_told and (name not in self._last or (verdict.is_sure and name not in self._sure)):

@@ -161,7 +161,7 @@ class BlockUpdate:
             return None
         self._tell_health(run.newest // SLOT * SLOT)
         health = self._judge.judge(run.newest, self._boom.tip_loads, lambda: self._boom.tip_sigmas)
-        self._boom.leave_out(self._judge.suspected, self._judge.failing_strokes)
+        self._boom.leave_out(self._judge.suspected, self._judge.failing_strokes, self._judge.wrong_angles)
         return health
 
     def _take_judgement(self, row: int) -> None:

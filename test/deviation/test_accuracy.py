@@ -81,10 +81,13 @@ def test_a_measured_position_shows_what_the_scene_has_wrong() -> None:
     assert (with_errors == exact).all()
 
 
-@pytest.mark.parametrize(("off", "low", "high"), [(0.0, 0.0, 1e-3), (4e-3, 0.08, 0.2)])
+@pytest.mark.parametrize(("off", "low", "high"), [(0.0, 0.0, 1e-3), (4e-3, 0.08, 0.2), (30e-3, 0.6, 1.5)])
 def test_a_transducer_that_an_angle_sensor_contradicts_is_stated(off: float, low: float, high: float) -> None:
-    """Cylinder 2 reads too much. The error is within what is stated, which is small without a contradiction."""
-    twin, rng, rest = Twin(SCENE, EXACT), np.random.default_rng(2), statics(SCENE, strokes=ARCH)
+    """Cylinder 2 reads too much. The error is within what is stated, which is small without a contradiction.
+
+    Of 30 mm the commissioning check leaves the angle sensor out. The stroke may still be the one that is wrong.
+    """
+    twin, rng, rest = Twin(SCENE, EXACT, health=True), np.random.default_rng(2), statics(SCENE, strokes=ARCH)
     strokes = rest.lengths + off * np.eye(4)[1]
     for k in range(1000):
         report = twin.update(Sample(Stream.STROKES, 5_000_000 * k, strokes + 2e-5 * rng.normal(size=4)))
