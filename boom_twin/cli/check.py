@@ -267,6 +267,15 @@ def _accuracy(
                 continue
             values[f"accuracy_{posture}:{name}"] = [*result.tip, *result.acceleration, *result.load]
             lines.append(f"  {posture:12} {name:24} {_accuracy_row(result)}")
+            if not streams:
+                usual, drives = Settings(), strokes_of_posture(scene, posture)
+                both = accuracy_at(scene, drives, streams, usual, reads=reads, places=places).tip
+                added = [float(each) for each in (both**2 - result.tip**2) ** 0.5]
+                values[f"scene_error_{posture}"] = added
+                x, y, pitch = (1e3 * each for each in added)
+                lines.append(
+                    f"  {'':12} {f'a scene {usual.scene_error:.0%} wrong adds':24} {f'{x:.2f}, {y:.2f}':>16} {pitch:11.2f}"
+                )
     return values, lines
 
 

@@ -13,8 +13,8 @@ fundamental: pi / 2 times its amplitude.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import pi, sqrt
+from dataclasses import dataclass, replace
+from math import hypot, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +39,8 @@ class Pulses:
     Attributes
     ----------
     height, height_sigma : float
-        Of rectangular pulses, on for half of every period, with the same fundamental, and its standard deviation, N.
+        Of rectangular pulses, on for half of every period, with the same fundamental, and its standard deviation, N. In
+        `TipLoad` that contains the standard deviation of the estimated load, since its error may have the same frequency.
     frequency, frequency_sigma : float
         Hz.
     """
@@ -59,7 +60,7 @@ class TipLoad:
     rms, sigma : float
         Root mean squares of the estimate and of its standard deviation, N.
     pulses : Pulses or None
-        Periodic part, if it stands out.
+        Periodic part, if it stands out, is `LEAST` or more, and can be told from none.
     """
 
     rms: float
@@ -73,16 +74,16 @@ class TipLoad:
 
     @property
     def is_there(self) -> bool:
-        """Return True if the load is `bound` or more, or has pulses of `LEAST` or more."""
-        return self.rms >= self.bound or (self.pulses is not None and self.pulses.height >= LEAST)
+        """Return True if the load is `bound` or more, or has pulses."""
+        return self.rms >= self.bound or self.pulses is not None
 
     @property
     def text(self) -> str:
-        """Load in words: ``pulses of 128 N at 0.430 Hz (+- 0.001)``, or its size, or ``none above 20 N``."""
-        if self.pulses is not None and self.pulses.height >= LEAST:
+        """Load in words: ``pulses of 128 N (+- 14) at 0.430 Hz (+- 0.001)``, or its size, or ``none above 20 N``."""
+        if self.pulses is not None:
             digits = min(max(1, int(np.ceil(-np.log10(self.pulses.frequency_sigma)))), 4)
             sure = f"{self.pulses.frequency:.{digits}f} Hz (+- {self.pulses.frequency_sigma:.{digits}f})"
-            return f"pulses of {self.pulses.height:.0f} N at {sure}"
+            return f"pulses of {self.pulses.height:.0f} N (+- {self.pulses.height_sigma:.0f}) at {sure}"
         if self.rms >= self.bound:
             return f"{self.rms:.0f} N rms (+- {self.sigma:.0f}), no main frequency"
         return f"none above {self.bound:.0f} N"
@@ -216,7 +217,11 @@ class TipLoadFinder:
             return None
         newest = _pulses_in_bins(self._places, self._loads)
         rms, sigma = sqrt(self._squares / self._count), sqrt(self._variances / self._count)
-        return TipLoad(rms, sigma, _stronger(self._strongest, newest))
+        pulses = _stronger(self._strongest, newest)
+        if pulses is not None:
+            pulses = replace(pulses, height_sigma=hypot(pulses.height_sigma, sigma))
+            pulses = pulses if pulses.height >= max(LEAST, 2.0 * pulses.height_sigma) else None
+        return TipLoad(rms, sigma, pulses)
 
 
 def _stronger(one: Pulses | None, other: Pulses | None) -> Pulses | None:

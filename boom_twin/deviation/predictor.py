@@ -33,6 +33,7 @@ from .posture import Posture, linearise, new_posture
 from .rest_at_readings import RestFinder
 from .sensor_model import mounting_of
 from .states import DOUBTS, ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
+from .tip_estimate import add_scene_error
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 GAUGE_DRIFT = 0.03  # share of the moment in a root second, by which the zero of a strain gauge drifts
@@ -347,7 +348,9 @@ class BoomPredictor:
         rows[:, 2 * m + 2 : 2 * m + 4] = columns[:, :2]
         rows[:, drive : drive + n] = columns[:, 2 : 2 + n]
         spread = self.filters.spread[PREDICTION, : rows.shape[1], : rows.shape[1]]
-        return np.asarray(np.sqrt(np.einsum("ai,ij,aj->a", rows, spread, rows)))
+        by_scene = np.zeros(6)  # upper triangle for x, y and angle
+        add_scene_error(self.posture, self.filters, self.live, 0, by_scene)
+        return np.asarray(np.sqrt(np.einsum("ai,ij,aj->a", rows, spread, rows) + by_scene[[0, 3]]))
 
     # -- what a prediction has
 

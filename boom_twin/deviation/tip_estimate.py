@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..kernels.jit import inner
+from ..kernels.jit import inner, kernel
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y
 from .channels import READS_COORDINATE
 from .estimate_row import (
@@ -22,7 +22,7 @@ from .estimate_row import (
 )
 from .kalman import ANGLE_ZERO
 from .mixture import renew_estimate
-from .rows import acceleration_row, column_row, difference, rate_row, read, spread_of
+from .rows import acceleration_row, clear, column_row, difference, rate_row, read, spread_of
 from .states import ESTIMATE, PREDICTION, force_place, zero_place
 
 MASS_PART = 0.77  # variance of the tip by errors of the masses over that of EI: a cantilever of four equal sections
@@ -44,8 +44,7 @@ def write_tip_estimate(p, f, live, results, out):
         out[ACCELERATION + a] = results.tip[2, a] + difference(f.rows[6 + a], mean, expected, size)
     write_covariance(f, 0, size, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     add_doubt(p, f, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
-    if not reads_points(p, f):
-        add_scene_error(p, f, live, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
+    add_scene_doubt(p, f, live, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     write_covariance(f, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
     write_covariance(f, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
     for j in range(MODES):
@@ -85,17 +84,34 @@ def add_square(out, share, moved):
 
 
 @inner
-def reads_points(p, f):
-    """Return True if the estimate has read the position of a point, which also shows what the scene has wrong."""
-    for c in range(p.channels.shape[0]):
-        if p.channels[c].kind == READS_COORDINATE and p.behind[0] > p.channels[c].zero and not f.masked[c]:
-            return True
-    return False
+def add_scene_doubt(p, f, live, out):
+    """Add the variance by errors of the scene to the upper triangle of the tip's covariance, or what a measured point leaves.
+
+    A point on the last section shows the errors of the sections before. What it is off by is its zero or the tip's error.
+    """
+    n, measured, zero = p.drives.shape[0], f.rows[0], zero_place(p)
+    clear(measured, 6)
+    add_scene_error(p, f, live, 0, measured)
+    for c in range(p.channels.shape[0] - 1):
+        channel, at = p.channels[c], zero + p.channels[c].zero
+        is_first = channel.kind == READS_COORDINATE and channel.index == 0 and p.behind[0] > channel.zero + 1
+        if is_first and p.sites[channel.site].section == n - 1 and not (f.masked[c] or f.masked[c + 1]):
+            left, x, y = f.rows[1], f.mean[ESTIMATE, at], f.mean[ESTIMATE, at + 1]
+            clear(left, 6)
+            left[0] = x * x + f.spread[ESTIMATE, at, at]
+            left[1] = x * y + f.spread[ESTIMATE, at, at + 1]
+            left[3] = y * y + f.spread[ESTIMATE, at + 1, at + 1]
+            add_scene_error(p, f, live, n if channel.site == 0 else n - 1, left)
+            if left[0] + left[3] < measured[0] + measured[3]:
+                for i in range(6):
+                    measured[i] = left[i]
+    for i in range(6):
+        out[i] += measured[i]
 
 
-@inner
-def add_scene_error(p, f, live, out):
-    """Add the variance by wrong stiffnesses and masses of sections to the upper triangle of the tip's covariance.
+@kernel
+def add_scene_error(p, f, live, first, out):
+    """Add the variance by wrong stiffnesses and masses of the sections from `first` on to an upper triangle.
 
     The bending of section i moves the tip by c_i = (d_i + a_i e_z x r_i, a_i), with the deflection d_i and the turn a_i of its
     end against its root, and r_i from its end to the tip. Independent relative errors of the EI add the sum of c_i c_i^T times
@@ -103,7 +119,7 @@ def add_scene_error(p, f, live, out):
     """
     n, share2 = p.drives.shape[0], (1.0 + MASS_PART) * f.noise.scene_error * f.noise.scene_error
     tip, moved = live.frames[p.roots[n]], f.row
-    for i in range(n):
+    for i in range(first, n):
         root, end = live.frames[p.roots[i]], live.frames[p.roots[i + 1] - (1 if i < n - 1 else 0)]
         heading, turn = root[FRAME_ANGLE], end[FRAME_ANGLE] - root[FRAME_ANGLE]
         moved[0] = end[FRAME_X] - root[FRAME_X] - p.lengths[i] * math.cos(heading) - turn * (tip[FRAME_Y] - end[FRAME_Y])

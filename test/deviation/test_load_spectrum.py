@@ -35,7 +35,7 @@ def test_rectangular_pulses_give_their_frequency_and_height(frequency: float, se
     assert found is not None and found.pulses is not None
     assert found.pulses.frequency == pytest.approx(frequency, rel=0.02)
     assert found.pulses.height == pytest.approx(130.0, rel=0.05)
-    assert found.text.startswith(f"pulses of {found.pulses.height:.0f} N at ")
+    assert found.text.startswith(f"pulses of {found.pulses.height:.0f} N (+- {found.pulses.height_sigma:.0f}) at ")
 
 
 def test_a_sine_in_any_direction_gives_its_fundamental() -> None:
@@ -76,6 +76,13 @@ def test_a_small_load_is_none_and_what_was_never_measured_is_not_told() -> None:
     assert small is not None and small.text == "none above 20 N"
     assert known_load(t, np.zeros((len(t), 2))) is None
     assert known_load(t[:0], np.zeros((0, 2))) is None
+
+
+@pytest.mark.parametrize(("sigma", "told"), [(10.0, "pulses of 130 N (+- 14) at"), (60.0, "none above 170 N")])
+def test_pulses_within_the_uncertainty_of_the_estimate_are_not_told_from_none(sigma: float, told: str) -> None:
+    t = times(40.0)
+    found = tip_load(t, pulses(t, 0.43, 130.0) - 65.0 * UP, np.full((len(t), 2), sigma**2))
+    assert found is not None and found.text.startswith(told) and found.is_there == ("pulses" in told)
 
 
 @pytest.mark.parametrize(("sigma", "told"), [(10.0, "85 N rms (+- 14), no main frequency"), (60.0, "none above 170 N")])
