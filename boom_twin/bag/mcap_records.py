@@ -22,6 +22,9 @@ from ..errors import BagError
 from ..system.received_files import open_received
 from .session_file import REMEDY
 
+PROFILE = "ros2"
+NOTES = "boom_twin"  # name of the metadata record that holds the notes on a session
+
 LARGEST_SUMMARY = 64 * 2**20  # size limit of one record of a summary, and of all definitions together, bytes
 MOST_HELD = 2**30  # size limit of one message or one unpacked chunk in memory, bytes
 MOST_TOGETHER = 2**22

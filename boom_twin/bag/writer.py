@@ -21,8 +21,7 @@ from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
 from ..twin.blocks import Integers
 from . import metadata as bagmeta
-from .mcap_file import NOTES, PROFILE
-from .mcap_records import MOST_HELD
+from .mcap_records import MOST_HELD, NOTES, PROFILE
 from .mcap_writer import McapWriter
 from .metadata import Recorded, WrittenFile, metadata_of
 
