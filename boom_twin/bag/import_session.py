@@ -184,8 +184,11 @@ def _readings(
     logs = np.array([clock.at(stamp) for stamp in stamps.tolist()])
     for stream in Stream:
         sensors = topics.sensors_of(stream, joints)
-        if not any(channel in uses for channel in sensors):
+        if not (there := [channel for channel in sensors if channel in uses]):
             continue
+        if stream not in topics.inputs:
+            told = "IMUs, moments and points need a place in --mapping; a gyro cannot be imported"
+            raise BagError(f"{there[0]}: has no topic. {told}. Leave the column out: --column {there[0]}=none.")
         values = np.full((len(stamps), len(sensors)), np.nan)
         own = np.array([channel in uses for channel in sensors])
         for column, (channel, sensor) in enumerate(sensors.items()):
@@ -193,9 +196,9 @@ def _readings(
                 units, unit = sensor_kind(channel).units, uses[channel].unit
                 readings = rows.numbers[uses[channel].place]
                 values[:, column] = readings if unit == sensor.unit else readings * (units[unit] / units[sensor.unit])
-        there = np.isfinite(values[:, own])
-        filled = there.any(axis=1)
-        is_apart = bool(there.all(axis=1).sum() < whole_share * filled.sum())
+        known = np.isfinite(values[:, own])
+        filled = known.any(axis=1)
+        is_apart = bool(known.all(axis=1).sum() < whole_share * filled.sum())
         found.append(Readings(stream, logs[filled], stamps[filled], values[filled], own, is_apart))
     return found
 

@@ -256,6 +256,10 @@ FAULTS = {
     "no header": (GOOD.partition("\n")[2], "numbers stand in its first line"),
     "numbers above": ("\n".join([*GOOD.splitlines()[1:20], GOOD]), "rows of numbers stand above the header in line 20. Cut"),
     "no table": ("nothing\nto see", "no table found. The file begins with 'nothing'"),
+    "a gyro": (
+        "\n".join(f"{row};{'0,1' if k else 'tip_imu_rate'}" for k, row in enumerate(GOOD.splitlines())),
+        "tip_imu_rate: has no topic.",
+    ),
     "no time": (GOOD.replace("Zeit", "Nr"), "no column of times among"),
     "ms or s": (table([TIMELESS], lambda row: f"{0.15 * row:.2f}", numbers(",", 4)), "the times may be in s or ms"),
     "some times with an offset": (
