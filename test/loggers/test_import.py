@@ -278,6 +278,12 @@ def test_what_cannot_be_known_is_refused_with_its_place(tmp_path: Path, fault: s
     assert words in capsys.readouterr().err and not (tmp_path / "s").exists()
 
 
+def test_a_proposal_asks_for_a_column_of_times_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "log.csv").write_text("cylinder_1 [mm];cylinder_2 [mm]\n1,5;2,5\n1,6;2,6\n")
+    assert main(["import", str(tmp_path / "log.csv"), "--propose"]) == 0
+    assert '  - {column: "GIVE_ONE", file: "log.csv"}' in capsys.readouterr().out
+
+
 LINES = GOOD.splitlines()
 BETWEEN = {  # lines of files, and how many of them are no readings
     "a comment": ([*LINES[:40], "pump on", *LINES[40:]], 1),
