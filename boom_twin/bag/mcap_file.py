@@ -7,7 +7,6 @@ from collections.abc import Iterator, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from io import BytesIO
-from itertools import pairwise
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -20,13 +19,11 @@ from mcap.records import Chunk, ChunkIndex, Statistics
 from mcap.summary import Summary
 
 from ..errors import BagError
-from ..messages.cdr_decoder import MessageBlock, by_log_time, gather, joined
+from ..messages.cdr_decoder import MessageBlock, by_log_time, gather
 from ..system.received_files import open_received
 from .mcap_records import (
     LARGEST_SUMMARY,
     MESSAGE_HEAD,
-    MOST_HELD,
-    MOST_TOGETHER,
     NOTES,
     PREFIX,
     PROFILE,
@@ -36,7 +33,7 @@ from .mcap_records import (
     unpack,
 )
 from .scanner import DamagedBytes, definitions_of, scan_records
-from .session_file import PIECE, LogClock, SessionFile, as_bag_error, by_topic, compare_counts
+from .session_file import MOST_HELD, PIECE, LogClock, Part, SessionFile, as_bag_error, by_topic, compare_counts
 
 _CRC = PREFIX.size + 24  # offset of the checksum in the record of a chunk
 _LENGTH = 8  # size of the length field right before the body of a record, bytes
@@ -77,34 +74,24 @@ class McapFile(SessionFile):
             blocks = (_messages(_content(file, piece)) for piece in self.pieces)
             return LogClock.of(((block.sources, block.log_times) for block in blocks), self.counts)
 
-    def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
-        """Yield blocks as in `SessionFile`, one piece after the other. Messages of equal time keep the order of the file.
-
-        Only pieces that overlap in time are held together. If the clock was set back, the order is that of the file.
-        """
-        held: dict[int, MessageBlock] = {}
+    def parts(self, passed: Set[int], clock: LogClock) -> Iterator[Part]:
+        """Yield parts as in `SessionFile`, one for each piece. If the clock was set back, the order is that of the file."""
         pieces = sorted(enumerate(self.pieces), key=lambda each: 0 if clock.places else each[1].first)
-        chosen = (each for each in pieces if not each[1].channels or each[1].channels - passed)
+        newest = np.uint64(0)
         with open_received(self.path) as file:
-            for (number, piece), (_, after) in pairwise([*chosen, (0, None)]):
-                assert piece is not None
-                block = _messages(_content(file, piece))
-                block = block.chosen(rows := np.flatnonzero(~np.isin(block.sources, list(passed))))
-                if clock.places:
-                    shifts = np.array(clock.shifts, np.uint64)[np.searchsorted(clock.places, PIECE * number + rows, "right")]
-                    yield replace(block, log_times=np.maximum.accumulate(block.log_times + shifts))
+            for number, piece in pieces:
+                if piece.channels and not piece.channels - passed:
                     continue
-                held[number] = by_log_time(block)
-                if sum(len(each.content) for each in held.values()) > MOST_HELD or sum(map(len, held.values())) > MOST_TOGETHER:
-                    what = f"more than {MOST_HELD} bytes or {MOST_TOGETHER} messages are out of order"
-                    raise BagError(f"{self.path}: {what}. Sort them by log time: `mcap sort IN.mcap -o OUT.mcap`.")
-                ends = {
-                    at: len(each) if after is None else int(np.searchsorted(each.log_times, after.first))
-                    for at, each in sorted(held.items())
-                }
-                if due := [held[at].chosen(slice(0, end)) for at, end in ends.items() if end]:
-                    yield by_log_time(joined(due))
-                held = {at: held[at].chosen(slice(end, None)) for at, end in ends.items() if end < len(held[at])}
+                block = _messages(_content(file, piece))
+                rows = np.flatnonzero(~np.isin(block.sources, list(passed)))
+                block, bound = block.chosen(rows), piece.first
+                if clock.places and len(rows):
+                    places = np.searchsorted(clock.places, PIECE * number + rows, "right")
+                    times = block.log_times + np.array(clock.shifts, np.uint64)[places]
+                    times = np.maximum.accumulate(np.maximum(times, newest))
+                    block, bound, newest = replace(block, log_times=times), int(times[0]), times[-1]
+                if len(rows):
+                    yield Part(bound, number, by_log_time(block))
 
 
 def summarise(path: Path) -> McapFile:

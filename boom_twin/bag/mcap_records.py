@@ -20,15 +20,12 @@ from zstandard import ZstdDecompressor, ZstdError
 
 from ..errors import BagError
 from ..system.received_files import open_received
-from .session_file import REMEDY
+from .session_file import MOST_HELD, MOST_TOGETHER, REMEDY
 
 PROFILE = "ros2"
 NOTES = "boom_twin"  # name of the metadata record that holds the notes on a session
 
 LARGEST_SUMMARY = 64 * 2**20  # size limit of one record of a summary, and of all definitions together, bytes
-MOST_HELD = 2**30  # size limit of one message or one unpacked chunk in memory, bytes
-MOST_TOGETHER = 2**22
-"""Limit of messages in memory. An empty message takes ten times its bytes there."""
 BLOCK = 2**20  # number of bytes read at a time from a file of any size
 
 PREFIX = struct.Struct("<BQ")  # opcode and length of a record

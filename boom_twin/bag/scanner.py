@@ -24,7 +24,6 @@ from .mcap_records import (
     KINDS,
     LARGEST_SUMMARY,
     MESSAGE_HEAD,
-    MOST_HELD,
     NOTES,
     PREFIX,
     PROFILE,
@@ -37,7 +36,7 @@ from .mcap_records import (
     unpack_start,
     whole_parts,
 )
-from .session_file import PARSE_ERRORS, by_topic
+from .session_file import MOST_HELD, PARSE_ERRORS, by_topic
 
 _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
 """Pattern of a possible start of a message, a chunk or the end of the data: opcode, and a length below 2^40."""

@@ -21,9 +21,10 @@ from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
 from ..twin.blocks import Integers
 from . import metadata as bagmeta
-from .mcap_records import MOST_HELD, NOTES, PROFILE
+from .mcap_records import NOTES, PROFILE
 from .mcap_writer import McapWriter
 from .metadata import Recorded, WrittenFile, metadata_of
+from .session_file import MOST_HELD
 
 
 def claim_directory(directory: Path) -> None:
