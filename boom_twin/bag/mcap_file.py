@@ -22,6 +22,7 @@ from ..errors import BagError
 from ..messages.cdr_decoder import MessageBlock, by_log_time, gather
 from ..system.received_files import open_received
 from .mcap_records import (
+    HEADS,
     LARGEST_SUMMARY,
     MESSAGE_HEAD,
     NOTES,
@@ -36,9 +37,6 @@ from .scanner import DamagedBytes, definitions_of, scan_records
 from .session_file import MOST_HELD, PIECE, LogClock, Part, SessionFile, as_bag_error, by_topic, compare_counts
 
 _CRC = PREFIX.size + 24  # offset of the checksum in the record of a chunk
-_LENGTH = 8  # size of the length field right before the body of a record, bytes
-_HEAD = np.dtype([("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
-"""`MESSAGE_HEAD` behind the length of its record."""
 _MESSAGE = int(Opcode.MESSAGE)
 
 
@@ -204,6 +202,6 @@ def _messages(content: bytes) -> MessageBlock:
         elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA):
             record_of(opcode, content[start:end])  # refuses one that is not whole
     starts = np.array(found, np.int64)
-    heads = gather(content, starts - _LENGTH, _HEAD.itemsize).view(_HEAD)[:, 0]
+    heads = gather(content, starts - PREFIX.size, HEADS.itemsize).view(HEADS)[:, 0]
     channels, ends = heads["channel"].astype(np.int64), starts + heads["length"].astype(np.int64)
     return MessageBlock(content, channels, heads["log_time"].copy(), starts + MESSAGE_HEAD.size, ends)

@@ -9,6 +9,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
 from lz4.frame import LZ4FrameDecompressor
 from mcap import records as mcap_records
 from mcap.data_stream import ReadDataStream
@@ -30,6 +31,8 @@ BLOCK = 2**20  # number of bytes read at a time from a file of any size
 
 PREFIX = struct.Struct("<BQ")  # opcode and length of a record
 MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time (ns), publish time (ns) of a message
+HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")  # `PREFIX` and `MESSAGE_HEAD` in an array
+HEADS.names = ("opcode", "length", "channel", "sequence", "log_time", "publish_time")
 FOOTER = struct.Struct("<BQQQI8s")  # last record of a file and the magic after it
 KINDS: dict[int, Any] = {
     int(opcode): getattr(mcap_records, opcode.name.title().replace("_", ""))
