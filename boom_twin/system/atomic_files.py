@@ -19,7 +19,6 @@ HEAD = 4096  # number of first bytes of a file that identify an earlier result
 _RECORDINGS = frozenset({".mcap", ".db3", ".bag"})
 _BESIDE_THEM = frozenset({"metadata.yaml", "session.yaml", "truth.csv.gz"})
 
-SYNCED_AT_END = set[Path]()  # folders under construction, whose files are synced together
 _umask = os.umask(0)
 os.umask(_umask)
 
@@ -29,7 +28,7 @@ def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] =
 
     `path` has the old content or the new one at any time, also after a kill or the loss of power. A path that is no regular
     file (``/dev/stdout``, a pipe) is written to directly. The target of a symbolic link is replaced. Text is encoded as UTF-8,
-    its surrogates (bytes of a path) as escapes. `sync` syncs the file with a descriptor to the disk, outside `SYNCED_AT_END`.
+    its surrogates (bytes of a path) as escapes. `sync` syncs the file with a descriptor to the disk.
     """
     data = content.encode(errors="backslashreplace") if isinstance(content, str) else content
     try:
@@ -94,8 +93,6 @@ def sync_folder(folder: Path, sync: Callable[[int], None] = os.fsync) -> None:
 
 
 def _replace(path: Path, data: bytes, sync: Callable[[int], None]) -> None:
-    if not SYNCED_AT_END.isdisjoint(path.parents):
-        sync = lambda _: None  # noqa: E731
     handle, name = mkstemp(prefix=f".{path.name}.", suffix=DRAFT, dir=path.parent)
     draft = Path(name)
     try:

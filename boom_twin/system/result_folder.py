@@ -20,7 +20,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ..errors import BagError
-from .atomic_files import DRAFT, SYNCED_AT_END, sync_folder, write_atomic
+from .atomic_files import DRAFT, sync_folder, write_atomic
 from .received_files import real_path, sha256_of
 
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
@@ -95,12 +95,9 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
     try:
         note = {"command": kind.command, "state": "unfinished; if no such command runs, a run that was stopped left this"}
         (building / UNFINISHED).write_text(json.dumps(note) + "\n")
-        SYNCED_AT_END.add(building)
         yield building
-        SYNCED_AT_END.remove(building)
         _complete(building, kind)
     except BaseException as error:
-        SYNCED_AT_END.discard(building)
         with suppress(OSError):
             _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
             (building / UNFINISHED).unlink()
