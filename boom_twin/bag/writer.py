@@ -145,7 +145,7 @@ class BagWriter:
         with self._as_bag_error():
             self._finish()
             metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
-            bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata, self.sync)
+            bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata)
 
     def abandon(self) -> None:
         """Close the open file without its end; data in memory are lost."""

@@ -210,7 +210,7 @@ def test_all_files_of_a_result_are_synced(tmp_path: Path, monkeypatch: pytest.Mo
     assert str(building / "summary.json") in synced
 
 
-def test_a_file_is_the_old_one_or_the_new_one(tmp_path: Path) -> None:
+def test_a_file_is_the_old_one_or_the_new_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "scene.yaml"
     path.write_text("old")
     path.chmod(0o640)
@@ -219,8 +219,12 @@ def test_a_file_is_the_old_one_or_the_new_one(tmp_path: Path) -> None:
     def fail(handle: int) -> None:
         raise OSError(28, "No space left on device")
 
-    with pytest.raises(BagError, match=r"scene\.yaml: cannot be written \(No space left on device\)\. Make room"):
-        write_atomic(path, "new", sync=fail)
+    with (
+        monkeypatch.context() as patch,
+        pytest.raises(BagError, match=r"scene\.yaml: cannot be written \(No space left on device\)\. Make room"),
+    ):
+        patch.setattr(os, "fsync", fail)
+        write_atomic(path, "new")
     assert path.read_text() == "old"
     write_atomic(tmp_path / "link", "new")
     assert path.read_text() == "new" and path.stat().st_mode & 0o777 == 0o640 and (tmp_path / "link").is_symlink()
