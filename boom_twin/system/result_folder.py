@@ -20,7 +20,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ..errors import BagError
-from .atomic_files import DRAFT, sync_folder, write_atomic
+from .atomic_files import sync_folder, write_atomic
 from .received_files import real_path, sha256_of
 
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
@@ -40,15 +40,8 @@ class ResultKind:
     """True if a later run replaces the result. If not, it is a recording, which has no manifest and is never replaced."""
 
     def has(self, name: str) -> bool:
-        """Return True if a path is one of its files, or a draft beside them."""
-        last = name.rpartition("/")[2]
-        is_draft = last.startswith(".") and last.endswith(DRAFT) and _folders(name)[0] in _folders(*self.files)
-        return is_draft or any(name.count("/") == each.count("/") and fnmatchcase(name, each) for each in self.files)
-
-
-def _folders(*names: str) -> list[str]:
-    """Return the folders of files, innermost first, each with a slash at its end; ``./`` is the folder of the result."""
-    return [f"{parent}/" for name in names for parent in Path(name).parents]
+        """Return True if a path is one of its files."""
+        return any(name.count("/") == each.count("/") and fnmatchcase(name, each) for each in self.files)
 
 
 _SESSION = ("session_*.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz")
@@ -168,7 +161,7 @@ def _check_earlier(folder: Path, kind: ResultKind) -> None:
     if command != kind.command or listed is None:
         raise BagError(f"{folder}: holds {entries[0]}, and no manifest of `boom_twin {kind.command}`. {remedy}.")
     own = {name for name in listed if kind.has(name)}  # a manifest may come with a recording, and say anything
-    folders = set(_folders(*own))
+    folders = {f"{parent}/" for name in own for parent in Path(name).parents}
     for name in entries:
         if name not in own and name not in folders and name not in (MANIFEST, UNFINISHED):
             raise BagError(f"{folder}: holds {name}, which {command} did not write. {remedy}.")
