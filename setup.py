@@ -24,8 +24,9 @@ setup(
     package_data={
         "boom_twin": [
             "py.typed",
+            "alarms.json",
             "texts.json",
-            *(f"msg_config/*.{end}" for end in ("yaml", "rviz", "json", "xml")),
+            *(f"msg_config/*.{end}" for end in ("yaml", "rviz", "json", "txt", "xml")),
             "examples/*.yaml",
             "monitor/page/*",
             "report/templates/*.html",

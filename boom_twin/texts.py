@@ -1,4 +1,4 @@
-"""Alarm sentences, and translations (``texts.json``) of all texts for operators.
+"""Alarm sentences (``alarms.json``), and translations (``texts.json``) of all texts for operators.
 
 The sentences are used by `/diagnostics`, live page, report, ``summary.json`` and command line. Sentences hold no figures:
 figures are the alarm's evidence, which has no words.
@@ -13,24 +13,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 LANGUAGES = ("en", "de", "zh")
-FILE = Path(__file__).parent / "texts.json"
+FOLDER = Path(__file__).parent
+FILE = FOLDER / "texts.json"
 """Translations of English texts, in the order of `LANGUAGES`. The live page reads this file."""
-
-THINGS = {
-    "joint": "angle sensor of joint {n}",
-    "cylinder": "length transducer of cylinder {n}",
-    "cylinder_force": "force sensor of cylinder {n}",
-    "tip_imu": "tip IMU",
-    "joint_angles": "joint angles",
-    "cylinder_strokes": "cylinder lengths",
-    "cylinder_forces": "cylinder forces",
-    "tip": "tip",
-    "k": "oil spring of cylinder {n}",
-    "drive": "cylinder {n}",
-    "EI": "section {n}",
-    "stiffness": "base",
-}
-"""Names by kind of channel, or by last part of a parameter."""
 
 
 class Sentence(NamedTuple):
@@ -41,57 +26,10 @@ class Sentence(NamedTuple):
     stops: bool = False
 
 
-SENTENCES = {
-    "stuck": Sentence("{thing} repeats one reading again and again", "Check its cable and supply"),
-    "noise": Sentence("{thing} is much noisier than expected", "Check its cable, shield and mount"),
-    "spikes": Sentence("{thing} gives single readings far from their neighbours", "Check its cable and plug"),
-    "jump": Sentence("{thing} jumped faster than the boom can move", "Check its mount; if it stays, set its zero"),
-    "dropout": Sentence("{thing} gives no readings", "Check its cable, supply and driver"),
-    "dropout joint_angles": Sentence("no readings of {thing} are used", "Check that one driver sends them, and its cable"),
-    "dropout cylinder_forces": Sentence("no readings of {thing} are used", "Check that one driver sends them, and its cable"),
-    "intermittent": Sentence("{thing} fails again and again", "Check its cable and plug"),
-    "range": Sentence("{thing} gives impossible readings", "Check its unit, sign and zero in the mapping"),
-    "wiring": Sentence("{thing} is not wired as the mapping says", "Record slow moves, then run `boom_twin mapping --check`"),
-    "wiring scene": Sentence("the scene is of another boom", "Give the scene of this boom"),
-    "late": Sentence("stamps of {thing} are late", "Correct their delay in the mapping"),
-    "late cylinder_strokes": Sentence("stamps of {thing} are late", "Give all other streams the negative delay in the mapping"),
-    "deviation": Sentence("{thing} does not fit the cylinder lengths", "Compare both at rest, then set the zero"),
-    "deviation cylinder_force": Sentence(
-        "{thing} does not fit the model", "Check payload and line fill, then the sensor's zero"
-    ),
-    "exceeded": Sentence(
-        "the force at the tip is above its limit",
-        "Stop the pump, free the end hose, see if the boom touches anything",
-        True,
-    ),
-    "creeps": Sentence(
-        "{thing} changes its length slowly and evenly",
-        "If nobody moves it, put the boom down, then look for a leak of its load-holding valve",
-    ),
-    "softer k": Sentence(
-        "{thing} is softer than the scene says", "Finish the move, then look for air in the oil and loose pins"
-    ),
-    "softer EI": Sentence("{thing} is softer than the scene says", "Stop, and look for cracks", True),
-    "softer stiffness": Sentence(
-        "{thing} is softer than the scene says", "Stop, and look for outriggers that sink and loose bolts", True
-    ),
-    "more payload": Sentence(
-        "the boom carries more than the payload that is set", "Check what hangs at the tip, then set the payload"
-    ),
-    "less payload": Sentence(
-        "the boom carries less than the payload that is set", "Check what hangs at the tip, then set the payload"
-    ),
-    "more line_fill": Sentence("the pipe line holds more than the line fill that is set", "Set the line fill"),
-    "less line_fill": Sentence("the pipe line holds less than the line fill that is set", "Set the line fill"),
-    "off": Sentence("{thing} reads wrong", "Check the sensor's zero and scale"),
-    "off joint": Sentence(
-        "{thing}, or the length transducer beside it, reads wrong", "Compare both at rest, then set the zero"
-    ),
-    "gap": Sentence("cylinder lengths were missing", "Check cable and driver of the length transducers"),
-    "gap joint_angles": Sentence("joint angles were missing", "Check cable and driver of the angle sensors"),
-    "clock": Sentence("a clock was set", "No action is needed if this was intended"),
-    "": Sentence("{thing} does not behave as the model", "Inspect it"),
-}
+_ALARMS = json.loads((FOLDER / "alarms.json").read_bytes())
+THINGS: dict[str, str] = _ALARMS["things"]
+"""Names by kind of channel, or by last part of a parameter."""
+SENTENCES = {key: Sentence(*parts) for key, parts in _ALARMS["sentences"].items()}
 """Sentences by kind of alarm, some by kind of channel or parameter too. The last one is for unknown kinds."""
 
 

@@ -1,4 +1,4 @@
-"""Conversion of logger tables into a session of the messages that the rig would have published.
+"""Conversion of logger tables into messages that the rig would have published: an import, or one CSV file as a session.
 
 Readings are in the units of the mapping, SI by default. Signs, zeros and mounts are only in the mapping. The session
 keeps it.
@@ -19,13 +19,15 @@ from numpy.typing import NDArray
 from ..config.yaml_text import plain
 from ..errors import BagError
 from ..loggers.assignment import Assignment, ColumnFile, assign
-from ..loggers.log_table import LogRows, LogTable
+from ..loggers.log_table import CsvLogTable, LogRows, LogTable
 from ..loggers.times import Stamps, TableTimes, read_times, zone_of
 from ..messages.cdr_encoder import STAMP, EncodedBlock, EncodedRows, NumberFields, Template
 from ..messages.mapping import load_mapping, mapping_from
-from ..messages.topic_table import Topics
+from ..messages.topic_table import Topics, load_topics
+from ..system.received_files import open_received
 from ..types import NANO, SECOND, SENSORS, Array, Sample, Stream, channels_of, sensor_kind, stream_of
 from .metadata import dump
+from .session_file import SessionFile, as_bag_error, channel_of, schema_of
 from .session_model import SessionMetadata
 from .session_writer import LogTimes, named_message
 from .writer import MessageWriter
@@ -182,8 +184,11 @@ def _readings(
     logs = np.array([clock.at(stamp) for stamp in stamps.tolist()])
     for stream in Stream:
         sensors = topics.sensors_of(stream, joints)
-        if not any(channel in uses for channel in sensors):
+        if not (there := [channel for channel in sensors if channel in uses]):
             continue
+        if stream not in topics.inputs:
+            told = "IMUs, moments and points need a place in --mapping; a gyro cannot be imported"
+            raise BagError(f"{there[0]}: has no topic. {told}. Leave the column out: --column {there[0]}=none.")
         values = np.full((len(stamps), len(sensors)), np.nan)
         own = np.array([channel in uses for channel in sensors])
         for column, (channel, sensor) in enumerate(sensors.items()):
@@ -191,9 +196,9 @@ def _readings(
                 units, unit = sensor_kind(channel).units, uses[channel].unit
                 readings = rows.numbers[uses[channel].place]
                 values[:, column] = readings if unit == sensor.unit else readings * (units[unit] / units[sensor.unit])
-        there = np.isfinite(values[:, own])
-        filled = there.any(axis=1)
-        is_apart = bool(there.all(axis=1).sum() < whole_share * filled.sum())
+        known = np.isfinite(values[:, own])
+        filled = known.any(axis=1)
+        is_apart = bool(known.all(axis=1).sum() < whole_share * filled.sum())
         found.append(Readings(stream, logs[filled], stamps[filled], values[filled], own, is_apart))
     return found
 
@@ -258,3 +263,77 @@ def _kinds(readings: Readings, topics: Topics, joints: int) -> list[_Kind]:
         template = Template([message], fields)
         found.append(_Kind(topics.inputs[stream].absolute, [*Stream].index(stream), places, *own, template))
     return found
+
+
+_REMEDY = "`boom_twin import` reads files with other columns, units and times."
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CsvFile(SessionFile):
+    """Content of one CSV file: the messages that an import of it would write.
+
+    ``t_s,stroke_1_m,..[,joint_1_rad,..][,imu_x_m_s2,imu_z_m_s2][,cylinder_force_1_N,..]``, an empty cell where there is no
+    value. Strokes may be missing where there are angles: for a mapping with ``drive: angles``.
+    """
+
+    readings: list[Readings]
+    joints: int
+
+    def messages(self) -> Iterator[tuple[int, int, bytes]]:
+        numbers = {channel.topic: channel.id for channel in self.channels.values()}
+        for block in encoded_blocks(self.readings, load_topics(), self.joints):
+            found = [(place, numbers[rows.key], data) for rows in block.rows for place, data in zip(*rows[1:], strict=True)]
+            for place, number, data in sorted(found, key=lambda each: int(each[0])):
+                yield number, int(block.log_times[place]), data.tobytes()
+
+
+def summarise_csv(path: Path) -> CsvFile:
+    """Return the content of one CSV file in SI units. A BagError names a column or value that cannot be used, and its line."""
+    rows_to_judge, slowest_step = 20, 1.0  # rows; s from row to row, by which times in another unit are known
+    with as_bag_error(path):
+        open_received(path).close()
+    table, given, topics = CsvLogTable(path), ColumnFile(), load_topics()
+    assignment = assign([table], given, None)
+    _refuse_others(path, assignment)
+    read = read_tables(assignment, given, None)
+    if read[0].rows.remark:
+        raise BagError(f"{path}: {read[0].rows.remark} by an import. {_REMEDY}")
+    stamps = read[0].times.stamps
+    step = float(np.median(np.diff(stamps))) / SECOND if len(stamps) > 1 else 0.0
+    if read[0].times.is_local or (len(stamps) >= rows_to_judge and step >= slowest_step):
+        told = f"{read[0].times.words}, by {step:g} s from row to row"
+        raise BagError(f"{path}: {told}: t_s in seconds is needed, several rows a second. {_REMEDY}")
+    readings = readings_of(assignment, read, topics, assignment.joints)
+    counts = Counter[Stream]()
+    for each in readings:
+        counts[each.stream] += len(each.logs)
+    numbers = {stream: number for number, stream in enumerate(Stream, 1) if counts[stream]}
+    logs = np.concatenate([each.logs for each in readings])
+    return CsvFile(
+        path=path,
+        storage="csv",
+        library="CSV",
+        compression="none",
+        channels={number: channel_of(number, topics.inputs[stream].absolute) for stream, number in numbers.items()},
+        schemas={number: schema_of(number, SENSORS[stream].message) for stream, number in numbers.items()},
+        counts={number: counts[stream] for stream, number in numbers.items()},
+        start=int(logs.min()),
+        end=int(logs.max()),
+        notes={"file": read[0].rows.skipped_text} if read[0].rows.skipped else {},
+        readings=readings,
+        joints=assignment.joints,
+    )
+
+
+def _refuse_others(path: Path, assignment: Assignment) -> None:
+    """Raise BagError for a column that is not used, and for a cylinder (without any: a joint) that has no column."""
+    if assignment.unused:
+        told = "; ".join(f"{assignment.header(use)}: {use.reason}" for use in assignment.unused)
+        raise BagError(f"{told}. Take it out. {_REMEDY}")
+    has_strokes = any(stream_of(use.channel) is Stream.STROKES for use in assignment.used)
+    try:
+        assignment.check(assignment.joints, Stream.STROKES if has_strokes else Stream.ANGLES)
+    except BagError as error:
+        raise BagError(f"{path}: {error} These are options of `boom_twin import`.") from None
+    if not assignment.used:
+        raise BagError(f"{path}: no column of a channel. {_REMEDY}")

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from ..messages.cdr_decoder import has_header, stamp_in
 from ..messages.type_store import jazzy
 from ..types import NANO
-from .mcap_records import MOST_TOGETHER
 from .reader import Session, scan
-from .session_file import CDR, WHOLE, SessionFile, TimeWindow, as_bag_error, schema_of
+from .session_file import CDR, MOST_TOGETHER, WHOLE, SessionFile, TimeWindow, as_bag_error, schema_of
 
 
 def spacing_faults(stamps: NDArray[np.int64]) -> Iterator[str]:

@@ -3,60 +3,59 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Set
+from collections.abc import Iterator, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from io import BytesIO
-from itertools import pairwise
-from operator import attrgetter
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
-from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, Metadata, Schema, Statistics
-from mcap.stream_reader import StreamReader
+from mcap.records import Chunk, ChunkIndex, Statistics
 from mcap.summary import Summary
-from numpy.typing import NDArray
 
 from ..errors import BagError
-from ..messages.cdr_decoder import Integers, MessageBlock, by_log_time, gather, joined
+from ..messages.cdr_decoder import MessageBlock, by_log_time, gather
 from ..system.received_files import open_received
 from .mcap_records import (
+    HEADS,
     LARGEST_SUMMARY,
     MESSAGE_HEAD,
-    MOST_HELD,
-    MOST_TOGETHER,
+    NOTES,
     PREFIX,
+    PROFILE,
     bounds,
     check_ends,
-    parts,
     record_of,
     unpack,
 )
-from .session_file import PIECE, LogClock, SessionFile, as_bag_error
+from .scanner import DamagedBytes, definitions_of, scan_records
+from .session_file import MOST_HELD, PIECE, LogClock, Part, SessionFile, as_bag_error, by_topic, compare_counts
 
-PROFILE = "ros2"
-NOTES = "boom_twin"  # name of the metadata record that holds the notes on a session
-
-_RUN = 2**20  # size of a piece of messages outside chunks, bytes
 _CRC = PREFIX.size + 24  # offset of the checksum in the record of a chunk
-_CHUNK_HEAD = _CRC + 4 + 4 + 8  # bytes of the record of a chunk beside the name of its compression and its packed content
-_LENGTH = 8  # size of the length field right before the body of a record, bytes
-_HEAD = np.dtype([("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
-"""`MESSAGE_HEAD` behind the length of its record."""
 _MESSAGE = int(Opcode.MESSAGE)
+
+
+class Piece(NamedTuple):
+    """Part of a file that is read at once: a chunk, or messages outside chunks that follow each other."""
+
+    offset: int
+    length: int  # length, size: bytes in the file, and unpacked
+    size: int
+    first: int  # first, last: log times, ns
+    last: int
+    channels: Set[int]  # channels of its messages; empty if they are not known
 
 
 @dataclass(frozen=True)
 class McapFile(SessionFile):
     """Content of one .mcap file."""
 
-    # chunks, and runs of messages outside chunks, in the order of the file
-    pieces: list[ChunkIndex] = field(default_factory=list)
+    pieces: list[Piece] = field(default_factory=list)  # in the order of the file
 
     def messages(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield messages as in `SessionFile`, in the order of the file, with one piece in memory."""
@@ -68,38 +67,29 @@ class McapFile(SessionFile):
 
     @cached_property
     def log_clock(self) -> LogClock:
-        """Clock as in `SessionFile`, from the index of the messages; without one, from the messages."""
+        """Clock as in `SessionFile`, from all messages."""
         with as_bag_error(self.path), open_received(self.path) as file:
-            return LogClock.of((_log_times(file, piece) for piece in self.pieces), self.counts)
+            blocks = (_messages(_content(file, piece)) for piece in self.pieces)
+            return LogClock.of(((block.sources, block.log_times) for block in blocks), self.counts)
 
-    def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
-        """Yield blocks as in `SessionFile`, one piece after the other. Messages of equal time keep the order of the file.
-
-        Only pieces that overlap in time are held together. If the clock was set back, the order is that of the file.
-        """
-        held: dict[int, MessageBlock] = {}
-        pieces = sorted(enumerate(self.pieces), key=lambda each: 0 if clock.places else each[1].message_start_time)
-        chosen = (each for each in pieces if not each[1].message_index_offsets or each[1].message_index_offsets.keys() - passed)
+    def parts(self, passed: Set[int], clock: LogClock) -> Iterator[Part]:
+        """Yield parts as in `SessionFile`, one for each piece. If the clock was set back, the order is that of the file."""
+        pieces = sorted(enumerate(self.pieces), key=lambda each: 0 if clock.places else each[1].first)
+        newest = np.uint64(0)
         with open_received(self.path) as file:
-            for (number, piece), (_, after) in pairwise([*chosen, (0, None)]):
-                assert piece is not None
-                block = _messages(_content(file, piece))
-                block = block.chosen(rows := np.flatnonzero(~np.isin(block.sources, list(passed))))
-                if clock.places:
-                    shifts = np.array(clock.shifts, np.uint64)[np.searchsorted(clock.places, PIECE * number + rows, "right")]
-                    yield replace(block, log_times=np.maximum.accumulate(block.log_times + shifts))
+            for number, piece in pieces:
+                if piece.channels and not piece.channels - passed:
                     continue
-                held[number] = by_log_time(block)
-                if sum(len(each.content) for each in held.values()) > MOST_HELD or sum(map(len, held.values())) > MOST_TOGETHER:
-                    what = f"more than {MOST_HELD} bytes or {MOST_TOGETHER} messages are out of order"
-                    raise BagError(f"{self.path}: {what}. Sort them by log time: `mcap sort IN.mcap -o OUT.mcap`.")
-                ends = {
-                    at: len(each) if after is None else int(np.searchsorted(each.log_times, after.message_start_time))
-                    for at, each in sorted(held.items())
-                }
-                if due := [held[at].chosen(slice(0, end)) for at, end in ends.items() if end]:
-                    yield by_log_time(joined(due))
-                held = {at: held[at].chosen(slice(end, None)) for at, end in ends.items() if end < len(held[at])}
+                block = _messages(_content(file, piece))
+                rows = np.flatnonzero(~np.isin(block.sources, list(passed)))
+                block, bound = block.chosen(rows), piece.first
+                if clock.places and len(rows):
+                    places = np.searchsorted(clock.places, PIECE * number + rows, "right")
+                    times = block.log_times + np.array(clock.shifts, np.uint64)[places]
+                    times = np.maximum.accumulate(np.maximum(times, newest))
+                    block, bound, newest = replace(block, log_times=times), int(times[0]), times[-1]
+                if len(rows):
+                    yield Part(bound, number, by_log_time(block))
 
 
 def summarise(path: Path) -> McapFile:
@@ -123,9 +113,19 @@ def summarise(path: Path) -> McapFile:
             counts=dict(told.channel_message_counts),
             start=told.message_start_time,
             end=told.message_end_time,
-            pieces=sorted(summary.chunk_indexes, key=attrgetter("chunk_start_offset")),
+            pieces=sorted(
+                Piece(
+                    index.chunk_start_offset,
+                    index.chunk_length,
+                    index.uncompressed_size,
+                    index.message_start_time,
+                    index.message_end_time,
+                    index.message_index_offsets.keys(),
+                )
+                for index in summary.chunk_indexes
+            ),
             checked=all(_has_checksum(file, index) for index in summary.chunk_indexes),
-            notes=_notes(reader.iter_metadata()),
+            notes={key: value for each in reader.iter_metadata() if each.name == NOTES for key, value in each.metadata.items()},
         )
 
 
@@ -145,123 +145,50 @@ def _has_checksum(file: BinaryIO, chunk: ChunkIndex) -> bool:
 
 def _walk(path: Path, library: str) -> McapFile:
     """Return the content of a file from all of its records. Compare its statistics, if any, with the messages found."""
-    channels: dict[int, Channel] = {}
-    schemas: dict[int, Schema] = {}
-    notes: list[Metadata] = []
-    counts: Counter[int] = Counter()
-    told: Statistics | None = None
-    is_summed, chunks_summed = False, set[bool]()
-    pieces = list[ChunkIndex]()
-    with open_received(path) as file:
-        limit = min(MOST_HELD, path.stat().st_size)
-        for record in StreamReader(file, validate_crcs=True, emit_chunks=True, record_size_limit=limit).records:
-            inner = [record]
-            if isinstance(record, Chunk):
-                content = unpack(record)
-                block = _messages(content)
-                inner = [record_of(*each) for each in parts(content) if each[0] in (Opcode.CHANNEL, Opcode.SCHEMA)]
-                chunks_summed.add(record.uncompressed_crc != 0)
-                counts.update(block.sources.tolist())
-                if len(block):
-                    length = _CHUNK_HEAD + len(record.compression) + len(record.data)
-                    pieces.append(_piece(file.tell() - length, length, block.log_times, block.sources, record))
-            for each in inner:
-                match each:
-                    case Message():
-                        counts[each.channel_id] += 1
-                        _add_to_run(pieces, each, file.tell())
-                    case Channel():
-                        channels[each.id] = each
-                    case Schema():
-                        schemas[each.id] = each
-                    case Metadata():
-                        notes.append(each)
-                    case DataEnd():
-                        is_summed = each.data_section_crc != 0
-                    case Statistics():
-                        told = each
-    held = McapFile(
+    known, counts, pieces, are_vouched = definitions_of(path), Counter[int](), list[Piece](), True
+    if known.is_summed is False:
+        raise McapError("crc validation failed: the checksum of the data does not fit")
+    for records in scan_records(path):
+        if isinstance(records, DamagedBytes):
+            raise McapError(f"byte {records.offset}: {records.reason}")
+        if len(block := _messages(records.content)):
+            counts.update(channels := block.sources.tolist())
+            span = int(block.log_times.min()), int(block.log_times.max())
+            pieces.append(Piece(records.offset, records.length, len(records.content), *span, {*channels}))
+            are_vouched &= records.vouched
+    if known.told is not None:
+        compare_counts(path, "statistics", known.told, "in the file", by_topic(counts, known.channels))
+    return McapFile(
         path=path,
         storage="mcap",
         library=library,
         compression="no index of chunks",
-        channels=channels,
-        schemas=schemas,
+        channels=known.channels,
+        schemas=known.schemas,
         counts=dict(counts),
-        start=min((piece.message_start_time for piece in pieces), default=0),
-        end=max((piece.message_end_time for piece in pieces), default=0),
-        checked=is_summed or (chunks_summed == {True} and told is not None),
-        notes=_notes(notes),
+        start=min((piece.first for piece in pieces), default=0),
+        end=max((piece.last for piece in pieces), default=0),
+        checked=bool(known.is_summed) or (bool(pieces) and are_vouched and known.told is not None),
+        notes=known.notes,
         pieces=pieces,
     )
-    if told is not None:
-        held.check_counts("statistics", told.channel_message_counts, "in the file", counts)
-    return held
 
 
-def _piece(
-    start: int, length: int, log_times: Iterable[int], channels: Iterable[int], chunk: Chunk | None = None
-) -> ChunkIndex:
-    """Return the index of a chunk, or of a message outside chunks."""
-    times = [int(time) for time in log_times]
-    return ChunkIndex(
-        chunk_length=length,
-        chunk_start_offset=start,
-        compressed_size=len(chunk.data) if chunk else 0,
-        compression=chunk.compression if chunk else "",
-        message_end_time=max(times),
-        message_index_length=0,
-        message_index_offsets=dict.fromkeys(map(int, channels), 0),
-        message_start_time=min(times),
-        uncompressed_size=chunk.uncompressed_size if chunk else length,
-    )
-
-
-def _add_to_run(pieces: list[ChunkIndex], message: Message, end: int) -> None:
-    """Add a message outside chunks, which ends before the offset `end`, to the run right before it, or begin a new run."""
-    length = PREFIX.size + MESSAGE_HEAD.size + len(message.data)
-    run = pieces[-1] if pieces and not pieces[-1].compressed_size else None
-    if run is None or run.chunk_start_offset + run.chunk_length != end - length or run.chunk_length + length > _RUN:
-        pieces.append(_piece(end - length, length, [message.log_time], [message.channel_id]))
-        return
-    run.chunk_length = run.uncompressed_size = run.chunk_length + length
-    run.message_start_time = min(run.message_start_time, message.log_time)
-    run.message_end_time = max(run.message_end_time, message.log_time)
-    run.message_index_offsets[message.channel_id] = 0
-
-
-def _notes(found: Iterable[Metadata]) -> dict[str, str]:
-    return {key: value for record in found if record.name == NOTES for key, value in record.metadata.items()}
-
-
-def _content(file: BinaryIO, piece: ChunkIndex) -> bytes:
+def _content(file: BinaryIO, piece: Piece) -> bytes:
     """Return the bytes of the records in a piece of a file: a chunk with verified checksum, or messages outside chunks.
 
     Raise BagError if the piece is larger than `MOST_HELD`.
     """
-    if (size := max(piece.chunk_length, piece.uncompressed_size)) > MOST_HELD:
+    if (size := max(piece.length, piece.size)) > MOST_HELD:
         remedy = "Write smaller chunks: `mcap compress --chunk-size 1048576 IN.mcap -o OUT.mcap`."
         raise BagError(f"{file.name}: a chunk of {size} bytes; at most {MOST_HELD} are held in memory. {remedy}")
-    file.seek(piece.chunk_start_offset)
-    raw = file.read(piece.chunk_length)
-    if len(raw) != piece.chunk_length or not raw.startswith(PREFIX.pack(Opcode.CHUNK, len(raw) - PREFIX.size)):
-        if len(raw) == piece.chunk_length == piece.uncompressed_size and raw[0] == Opcode.MESSAGE:
+    file.seek(piece.offset)
+    raw = file.read(piece.length)
+    if len(raw) != piece.length or not raw.startswith(PREFIX.pack(Opcode.CHUNK, len(raw) - PREFIX.size)):
+        if len(raw) == piece.length == piece.size and raw[0] == Opcode.MESSAGE:
             return raw
-        raise McapError(f"no chunk of {piece.chunk_length} bytes at byte {piece.chunk_start_offset}")
+        raise McapError(f"no chunk of {piece.length} bytes at byte {piece.offset}")
     return unpack(Chunk.read(ReadDataStream(BytesIO(raw[PREFIX.size :]))))
-
-
-def _log_times(file: BinaryIO, piece: ChunkIndex) -> tuple[Integers, NDArray[np.uint64]]:
-    """Return channels and log times of the messages in a piece, in its order."""
-    if not piece.message_index_length:
-        block = _messages(_content(file, piece))
-        return block.sources, block.log_times
-    file.seek(piece.chunk_start_offset + piece.chunk_length)
-    index = [body for opcode, body in parts(file.read(piece.message_index_length)) if opcode == Opcode.MESSAGE_INDEX]
-    own = {int.from_bytes(body[:2], "little"): np.frombuffer(body[6:], "<u8").reshape(-1, 2) for body in index}
-    channels, (times, offsets) = np.repeat(list(own), [*map(len, own.values())]), np.concatenate([*own.values()]).T
-    order = np.argsort(offsets, kind="stable")
-    return channels[order], times[order]
 
 
 def _messages(content: bytes) -> MessageBlock:
@@ -275,6 +202,6 @@ def _messages(content: bytes) -> MessageBlock:
         elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA):
             record_of(opcode, content[start:end])  # refuses one that is not whole
     starts = np.array(found, np.int64)
-    heads = gather(content, starts - _LENGTH, _HEAD.itemsize).view(_HEAD)[:, 0]
+    heads = gather(content, starts - PREFIX.size, HEADS.itemsize).view(HEADS)[:, 0]
     channels, ends = heads["channel"].astype(np.int64), starts + heads["length"].astype(np.int64)
     return MessageBlock(content, channels, heads["log_time"].copy(), starts + MESSAGE_HEAD.size, ends)

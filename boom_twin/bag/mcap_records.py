@@ -9,6 +9,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import numpy as np
 from lz4.frame import LZ4FrameDecompressor
 from mcap import records as mcap_records
 from mcap.data_stream import ReadDataStream
@@ -20,16 +21,18 @@ from zstandard import ZstdDecompressor, ZstdError
 
 from ..errors import BagError
 from ..system.received_files import open_received
-from .session_file import REMEDY
+from .session_file import MOST_HELD, MOST_TOGETHER, REMEDY
+
+PROFILE = "ros2"
+NOTES = "boom_twin"  # name of the metadata record that holds the notes on a session
 
 LARGEST_SUMMARY = 64 * 2**20  # size limit of one record of a summary, and of all definitions together, bytes
-MOST_HELD = 2**30  # size limit of one message or one unpacked chunk in memory, bytes
-MOST_TOGETHER = 2**22
-"""Limit of messages in memory. An empty message takes ten times its bytes there."""
 BLOCK = 2**20  # number of bytes read at a time from a file of any size
 
 PREFIX = struct.Struct("<BQ")  # opcode and length of a record
 MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time (ns), publish time (ns) of a message
+HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")  # `PREFIX` and `MESSAGE_HEAD` in an array
+HEADS.names = ("opcode", "length", "channel", "sequence", "log_time", "publish_time")
 FOOTER = struct.Struct("<BQQQI8s")  # last record of a file and the magic after it
 KINDS: dict[int, Any] = {
     int(opcode): getattr(mcap_records, opcode.name.title().replace("_", ""))

@@ -20,12 +20,11 @@ from zstandard import ZstdCompressor
 
 from ..messages.cdr_encoder import Bytes, EncodedBlock
 from ..twin.blocks import Integers
-from .mcap_records import MESSAGE_HEAD, PREFIX
+from .mcap_records import HEADS, MESSAGE_HEAD, PREFIX
 
 COMPRESSION = "zstd"
 _INDEX_HEAD = struct.Struct("<HI")  # index of one channel in one chunk: channel, bytes of entries
 _INDEX_ENTRY = struct.Struct("<QQ")  # log time (ns), place in the chunk
-_HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")  # array type of `PREFIX` and `MESSAGE_HEAD`
 
 
 class McapWriter:
@@ -78,12 +77,12 @@ class McapWriter:
         lengths = np.empty(len(channels), np.int64)
         for rows in block.rows:
             lengths[rows.places] = rows.data.shape[1]
-        ends = np.cumsum(lengths + _HEADS.itemsize)
-        starts = ends - lengths - _HEADS.itemsize
+        ends = np.cumsum(lengths + HEADS.itemsize)
+        starts = ends - lengths - HEADS.itemsize
         content = np.empty(ends[-1], np.uint8)
         _scatter(_heads(channels, sequences, block.log_times, lengths), content, starts)
         for rows in block.rows:
-            _scatter(rows.data, content, starts[rows.places] + _HEADS.itemsize)
+            _scatter(rows.data, content, starts[rows.places] + HEADS.itemsize)
         encoded, first, begin = content.data, 0, 0
         while first < len(ends):
             room = self._chunk_size - len(self._chunk.content)
@@ -211,11 +210,11 @@ class _OpenChunk:
 
 def _heads(channels: Integers, sequences: Integers, log_times: Integers, lengths: Integers) -> Bytes:
     """Return the bytes before the data of each message, a row each. `lengths` are the bytes of the data."""
-    heads = np.empty(len(channels), _HEADS)
+    heads = np.empty(len(channels), HEADS)
     columns = (Opcode.MESSAGE, lengths + MESSAGE_HEAD.size, channels, sequences, log_times, log_times)
-    for name, column in zip(_HEADS.names or (), columns, strict=True):
+    for name, column in zip(HEADS.names or (), columns, strict=True):
         heads[name] = column
-    return heads.view(np.uint8).reshape(-1, _HEADS.itemsize)
+    return heads.view(np.uint8).reshape(-1, HEADS.itemsize)
 
 
 def _scatter(rows: Bytes, target: Bytes, starts: Integers) -> None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from io import StringIO
@@ -135,9 +134,9 @@ def dump(document: Any) -> str:
     return text.getvalue()
 
 
-def write_metadata(path: Path, metadata: BagMetadata, sync: Callable[[int], None] = os.fsync) -> None:
+def write_metadata(path: Path, metadata: BagMetadata) -> None:
     """Write `metadata` as Jazzy does, atomically (see `write_atomic`). Equal values give equal bytes."""
-    write_atomic(path, dump({_ROOT: metadata.model_dump()}), sync)
+    write_atomic(path, dump({_ROOT: metadata.model_dump()}))
 
 
 def offered_qos(qos: Qos) -> list[dict[str, Any]]:

@@ -23,8 +23,7 @@ from rosbags.typesys import TypesysError, get_types_from_msg
 from ..errors import BagError
 from ..messages.type_store import jazzy, other_than_jazzy
 from ..system.received_files import holds_file, open_received
-from .mcap_records import MOST_HELD
-from .session_file import CDR, PARSE_ERRORS, PIECE, LogClock, SessionFile, channel_of, schema_of
+from .session_file import CDR, MOST_HELD, PARSE_ERRORS, PIECE, LogClock, SessionFile, channel_of, schema_of
 
 MAGIC = b"SQLite format 3\0"
 BESIDE = ("-wal", "-journal")  # suffixes of the files in which sqlite3 keeps data that are not in the database yet

@@ -33,7 +33,7 @@ SUMMARISE = {
     ".mcap": ("mcap_file", "summarise"),
     ".db3": ("other_storages", "summarise_sqlite"),
     ".bag": ("other_storages", "summarise_ros1"),
-    ".csv": ("csv_file", "summarise"),
+    ".csv": ("import_session", "summarise_csv"),
 }
 """Module and function for each suffix; only the module that is needed is imported.
 

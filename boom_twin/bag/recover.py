@@ -6,102 +6,42 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from mcap.opcode import Opcode
-from mcap.records import Channel, DataEnd, Header, Metadata, Schema, Statistics
 
 from ..config.yaml_text import LARGEST_FILE
 from ..errors import BagError
 from ..system.atomic_files import write_atomic
 from ..system.received_files import holds_file, open_received
 from ..system.result_folder import RECOVER, result_folder
-from .mcap_file import NOTES, PROFILE
-from .mcap_records import LARGEST_SUMMARY, MESSAGE_HEAD, checksum_of, parts, record_of, summary_start
+from .mcap_records import MESSAGE_HEAD, parts
 from .metadata import BagMetadata, Recorded, offered_qos, profiles
 from .reader import RECOVERED, SUMMARISE, scan, sources
-from .scanner import DamagedBytes, SoundRecords, scan_damaged
-from .session_file import as_bag_error, by_topic
+from .scanner import DamagedBytes, FileDefinitions, definitions_of, scan_records
+from .session_file import as_bag_error
 from .session_model import session_yaml
 from .writer import BagWriter
 
 
-@dataclass(slots=True)
-class FileDefinitions:
-    """Definitions, notes and counts of one damaged file."""
-
-    # channels, schemas: by number; one with a valid checksum replaces one without
-    channels: dict[int, Channel] = field(default_factory=dict)
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    notes: dict[str, str] = field(default_factory=dict)
-    told: Counter[str] | None = None  # number of messages by topic from a sound summary
-    is_summed: bool = False  # True if the checksum of the data section is valid
-
-    def topic(self, channel: int, metadata: BagMetadata | None) -> Recorded | None:
-        """Return the topic of a channel; None if its definition is lost."""
-        found = self.channels.get(channel)
-        schema = self.schemas.get(found.schema_id) if found else None
-        if found is None or schema is None:
-            return None
-        entries = metadata.topics_with_message_count if metadata else []
-        known = next((each.topic_metadata for each in entries if each.topic_metadata.name == found.topic), None)
-        offered = known.offered_qos_profiles if known else found.metadata.get("offered_qos_profiles", "")
-        return Recorded(
-            topic=found.topic,
-            type=schema.name,
-            definition=schema.data,
-            details=found.metadata,
-            qos=[profile for qos in profiles(offered) for profile in offered_qos(qos)],
-            type_hash=known.type_description_hash if known else found.metadata.get("topic_type_hash", ""),
-            encoding=found.message_encoding,
-            definition_encoding=schema.encoding,
-        )
-
-
-def definitions_of(path: Path) -> FileDefinitions:
-    """Return the definitions, notes and counts of a file from one walk through it.
-
-    A definition is used if the checksum of its chunk or of the summary fits or is missing. Raise BagError if the profile is
-    ros1 or px4, or definitions exceed `LARGEST_SUMMARY`.
-    """
-    found, sure = FileDefinitions(), set[tuple[int, int]]()
-    statistics: Statistics | None = None
-    summary = summary_start(path)
-    budget, is_data = LARGEST_SUMMARY, True
-    for piece in scan_damaged(path):
-        if not isinstance(piece, SoundRecords):
-            continue
-        is_in_summary = summary is not None and piece.offset >= summary
-        is_sure = piece.vouched or is_in_summary
-        for opcode, body in parts(piece.content):
-            if opcode in (Opcode.CHANNEL, Opcode.SCHEMA) and (is_sure or is_data):
-                budget -= len(body)
-                if budget < 0:
-                    raise BagError(
-                        f"{path}: more than {LARGEST_SUMMARY} bytes of definitions. It is not the work of a recorder."
-                    )
-                definition = record_of(opcode, body)
-                assert isinstance(definition, Channel | Schema)
-                table: dict[int, Any] = found.channels if opcode == Opcode.CHANNEL else found.schemas
-                if definition.id not in table or (is_sure and (opcode, definition.id) not in sure):
-                    table[definition.id] = definition
-                if is_sure:
-                    sure.add((opcode, definition.id))
-            elif opcode in (Opcode.HEADER, Opcode.METADATA, Opcode.DATA_END) or (opcode == Opcode.STATISTICS and is_in_summary):
-                match record_of(opcode, body):
-                    case Header(profile=("ros1" | "px4") as profile):
-                        raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system.")
-                    case Metadata(name=name, metadata=notes) if name == NOTES:
-                        found.notes |= notes
-                    case DataEnd(data_section_crc=checksum):
-                        is_data, summary = False, summary or summary_start(path, piece.offset + len(piece.content))
-                        with open_received(path) as file:
-                            found.is_summed = checksum != 0 and checksum == checksum_of(file, 0, piece.offset)
-                    case Statistics() as counts:
-                        statistics = counts
-    if statistics is not None and statistics.channel_message_counts.keys() <= found.channels.keys():
-        found.told = by_topic(statistics.channel_message_counts, found.channels)
-    return found
+def topic_of(definitions: FileDefinitions, channel: int, metadata: BagMetadata | None) -> Recorded | None:
+    """Return the topic of a channel; None if its definition is lost."""
+    found = definitions.channels.get(channel)
+    schema = definitions.schemas.get(found.schema_id) if found else None
+    if found is None or schema is None:
+        return None
+    entries = metadata.topics_with_message_count if metadata else []
+    known = next((each.topic_metadata for each in entries if each.topic_metadata.name == found.topic), None)
+    offered = known.offered_qos_profiles if known else found.metadata.get("offered_qos_profiles", "")
+    return Recorded(
+        topic=found.topic,
+        type=schema.name,
+        definition=schema.data,
+        details=found.metadata,
+        qos=[profile for qos in profiles(offered) for profile in offered_qos(qos)],
+        type_hash=known.type_description_hash if known else found.metadata.get("topic_type_hash", ""),
+        encoding=found.message_encoding,
+        definition_encoding=schema.encoding,
+    )
 
 
 MOST_FAULTS = 1000  # limit for the number of faults that are reported one by one
@@ -177,7 +117,7 @@ def _copy(
     metadata: BagMetadata | None,
 ) -> None:
     own: dict[int, int] = {}
-    for piece in scan_damaged(file, definitions.channels):
+    for piece in scan_records(file, definitions.channels):
         if isinstance(piece, DamagedBytes):
             outcome.note(file, piece)
             continue
@@ -186,7 +126,7 @@ def _copy(
                 continue
             channel, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(body)
             if channel not in own:
-                topic = definitions.topic(channel, metadata)
+                topic = topic_of(definitions, channel, metadata)
                 if topic is None:
                     outcome.nameless += 1
                     continue

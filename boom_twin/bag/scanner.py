@@ -1,38 +1,58 @@
-"""Scan a damaged .mcap file from front to back for sound records."""
+"""Scan an .mcap file that is damaged, or has no index, from front to back for sound records."""
 
 from __future__ import annotations
 
 import re
 import struct
+from collections import Counter
 from collections.abc import Container, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Chunk
+from mcap.records import Channel, Chunk, DataEnd, Header, Metadata, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
+from ..errors import BagError
 from ..system.received_files import open_received
-from .mcap_records import BLOCK, KINDS, MESSAGE_HEAD, MOST_HELD, PREFIX, bounds, record_of, unpack, unpack_start, whole_parts
-from .session_file import PARSE_ERRORS
+from .mcap_records import (
+    BLOCK,
+    KINDS,
+    LARGEST_SUMMARY,
+    MESSAGE_HEAD,
+    NOTES,
+    PREFIX,
+    PROFILE,
+    bounds,
+    checksum_of,
+    parts,
+    record_of,
+    summary_start,
+    unpack,
+    unpack_start,
+    whole_parts,
+)
+from .session_file import MOST_HELD, PARSE_ERRORS, by_topic
 
 _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
 """Pattern of a possible start of a message, a chunk or the end of the data: opcode, and a length below 2^40."""
 _CHUNK_HEAD = struct.Struct("<BQQQQII")
 _SIZE = struct.Struct("<Q")
+_MESSAGE = bytes([Opcode.MESSAGE])
 
 
 @dataclass(frozen=True, slots=True)
 class SoundRecords:
-    """Whole records that follow each other."""
+    """Records of a chunk, or outside chunks messages that follow each other, or one record of another kind."""
 
     offset: int
-    vouched: bool  # True if the checksum of their chunk fits
+    length: int  # bytes in the file
     content: bytes
+    vouched: bool = False  # True if the checksum of their chunk fits
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +64,7 @@ class DamagedBytes:
     reason: str
 
 
-def scan_damaged(path: Path, channels: Container[int] = ()) -> Iterator[SoundRecords | DamagedBytes]:
+def scan_records(path: Path, channels: Container[int] = ()) -> Iterator[SoundRecords | DamagedBytes]:
     """Yield all bytes of a file in order as sound records and damaged bytes, with one chunk in memory at a time.
 
     The whole records at the start of a chunk that is cut off, or that has no checksum, are sound. After damage, messages
@@ -59,9 +79,9 @@ def scan_damaged(path: Path, channels: Container[int] = ()) -> Iterator[SoundRec
             if (length := _chunk_length(file, offset)) is not None:
                 after = min(offset + length, size)
                 yield from _chunk_pieces(file, offset, length, size)
-            elif record := _whole_record(file, offset, size):
-                after = offset + len(record)
-                yield SoundRecords(offset, False, record)
+            elif records := _whole_records(file, offset, size):
+                after = offset + len(records)
+                yield SoundRecords(offset, len(records), records)
             else:
                 after = _behind(file, offset + 1, size, channels)
                 yield DamagedBytes(offset, after - offset, "no record that is whole begins here")
@@ -96,7 +116,7 @@ def _chunk_pieces(file: BinaryIO, offset: int, length: int, size: int) -> Iterat
         if chunk.uncompressed_crc == 0:
             for _ in bounds(content):  # refuses records that are not whole
                 pass
-        yield SoundRecords(offset, chunk.uncompressed_crc != 0, content)
+        yield SoundRecords(offset, length, content, chunk.uncompressed_crc != 0)
         return
     except PARSE_ERRORS as error:
         reason = str(error)
@@ -106,8 +126,19 @@ def _chunk_pieces(file: BinaryIO, offset: int, length: int, size: int) -> Iterat
         except PARSE_ERRORS as error:
             reason = f"{reason}; {error}"
     if start:
-        yield SoundRecords(offset, False, start)
+        yield SoundRecords(offset, min(length, size - offset), start)
     yield DamagedBytes(offset, min(length, size - offset), reason)
+
+
+def _whole_records(file: BinaryIO, offset: int, size: int) -> bytes:
+    """Return the record at `offset` if it is whole; of a message also the messages behind it, up to `BLOCK` bytes."""
+    found = bytearray(_whole_record(file, offset, size))
+    while found[:1] == _MESSAGE and len(found) < BLOCK:
+        record = _whole_record(file, offset + len(found), size)
+        if record[:1] != _MESSAGE:
+            break
+        found += record
+    return bytes(found)
 
 
 def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:
@@ -168,3 +199,61 @@ def _is_start(file: BinaryIO, offset: int, size: int, channels: Container[int]) 
     if file.read(1)[0] == Opcode.MESSAGE and int.from_bytes(channel, "little") not in channels:
         return False
     return _chunk_length(file, offset) is not None or bool(_whole_record(file, offset, size))
+
+
+@dataclass(slots=True)
+class FileDefinitions:
+    """Definitions, notes and counts of one file."""
+
+    # channels, schemas: by number; one with a valid checksum replaces one without
+    channels: dict[int, Channel] = field(default_factory=dict)
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
+    told: Counter[str] | None = None  # number of messages by topic from a sound summary
+    is_summed: bool | None = None  # True if the checksum of the data section is valid; None without one
+
+
+def definitions_of(path: Path) -> FileDefinitions:
+    """Return the definitions, notes and counts of a file from one walk through it.
+
+    A definition is used if the checksum of its chunk or of the summary fits or is missing. Raise BagError if the profile is
+    ros1 or px4, or definitions exceed `LARGEST_SUMMARY`.
+    """
+    found, sure = FileDefinitions(), set[tuple[int, int]]()
+    statistics: Statistics | None = None
+    summary = summary_start(path)
+    budget, is_data = LARGEST_SUMMARY, True
+    for piece in scan_records(path):
+        if not isinstance(piece, SoundRecords):
+            continue
+        is_in_summary = summary is not None and piece.offset >= summary
+        is_sure = piece.vouched or is_in_summary
+        for opcode, body in parts(piece.content):
+            if opcode in (Opcode.CHANNEL, Opcode.SCHEMA) and (is_sure or is_data):
+                budget -= len(body)
+                if budget < 0:
+                    raise BagError(
+                        f"{path}: more than {LARGEST_SUMMARY} bytes of definitions. It is not the work of a recorder."
+                    )
+                definition = record_of(opcode, body)
+                assert isinstance(definition, Channel | Schema)
+                table: dict[int, Any] = found.channels if opcode == Opcode.CHANNEL else found.schemas
+                if definition.id not in table or (is_sure and (opcode, definition.id) not in sure):
+                    table[definition.id] = definition
+                if is_sure:
+                    sure.add((opcode, definition.id))
+            elif opcode in (Opcode.HEADER, Opcode.METADATA, Opcode.DATA_END) or (opcode == Opcode.STATISTICS and is_in_summary):
+                match record_of(opcode, body):
+                    case Header(profile=("ros1" | "px4") as profile):
+                        raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system.")
+                    case Metadata(name=name, metadata=notes) if name == NOTES:
+                        found.notes |= notes
+                    case DataEnd(data_section_crc=checksum):
+                        is_data, summary = False, summary or summary_start(path, piece.offset + piece.length)
+                        with open_received(path) as file:
+                            found.is_summed = checksum == checksum_of(file, 0, piece.offset) if checksum else None
+                    case Statistics() as counts:
+                        statistics = counts
+    if statistics is not None and statistics.channel_message_counts.keys() <= found.channels.keys():
+        found.told = by_topic(statistics.channel_message_counts, found.channels)
+    return found

@@ -11,10 +11,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import accumulate, islice
+from heapq import merge
+from itertools import accumulate, islice, repeat
 from numbers import Real
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from mcap.exceptions import McapError
@@ -87,6 +88,9 @@ WHOLE = TimeWindow()  # window of the whole session
 
 
 CDR = "cdr"
+MOST_HELD = 2**30  # size limit of one message or one unpacked chunk in memory, bytes
+MOST_TOGETHER = 2**22
+"""Limit of messages in memory. An empty message takes ten times its bytes there."""
 PIECE = 2**32  # offset between the places of messages of two pieces of a file, more than the messages of a piece
 REMEDY = "The file is damaged or was cut off: `boom_twin recover BAG --out DIR` saves what is whole."
 
@@ -152,6 +156,14 @@ class LogClock(NamedTuple):
         return clock if 2 * agreed > sum(counts.values()) else cls([], [0])
 
 
+class Part(NamedTuple):
+    """Messages of a file that are read at once, sorted by log time."""
+
+    bound: int  # no message of this part or of a later one is older, ns
+    number: int  # place of the part in the file
+    block: MessageBlock
+
+
 @dataclass(frozen=True)
 class SessionFile(ABC):
     """Content of one file of a session."""
@@ -199,18 +211,19 @@ class SessionFile(ABC):
         """Yield messages as `messages` does, in the order of log times by the `clock`."""
         return self.messages()
 
-    def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
-        """Yield blocks of all messages, except of the `passed` channels, in the order of log times by the `clock`.
+    def parts(self, passed: Set[int], clock: LogClock) -> Iterator[Part]:
+        """Yield all messages, except of the `passed` channels, by ascending bounds, with log times by the `clock`.
 
         `sources` of a block holds channel numbers.
         """
         together = 2000  # messages in one block of a file that is read message by message
         found = (each for each in self.messages_by(clock) if each[0] not in passed)
-        while group := list(islice(found, together)):
+        for number, group in enumerate(iter(lambda: list(islice(found, together)), [])):
             sources, times, data = zip(*group, strict=True)
             ends = np.cumsum([len(each) for each in data])
             starts = np.concatenate([[0], ends[:-1]])
-            yield MessageBlock(b"".join(data), np.array(sources), np.array(times, np.uint64), starts, ends)
+            block = MessageBlock(b"".join(data), np.array(sources), np.array(times, np.uint64), starts, ends)
+            yield Part(times[0], number, block)
 
 
 def schema_of(number: int, type_name: str, definition: str = "") -> Schema:
@@ -261,7 +274,8 @@ class SessionBlocks:
     def __iter__(self) -> Iterator[MessageBlock]:
         clocks = [file.log_clock for file, _ in self._files]
         ahead = accumulate((clock.shifts[-1] for clock in clocks), initial=0)  # a clock set back stays so in later files
-        blocks = _merged([_wanted(*file, clock, late) for file, clock, late in zip(self._files, clocks, ahead, strict=False)])
+        parts = [_wanted(*file, clock, late) for file, clock, late in zip(self._files, clocks, ahead, strict=False)]
+        blocks = _in_order([file.path for file, _ in self._files], parts)
         return blocks if self._window == WHOLE else self._window.cut(blocks, self._files[0][0].path)
 
     def decoded(self, block: MessageBlock, row: int) -> Any:
@@ -298,37 +312,31 @@ class SessionBlocks:
                 yield source, np.array([stamp]), message
 
 
-def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahead: int) -> Iterator[MessageBlock]:
-    """Yield blocks of the requested channels of one file (number 0 or more), `ahead` ns later."""
+def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahead: int) -> Iterator[Part]:
+    """Yield the parts of one file with the requested channels (number 0 or more), `ahead` ns later."""
     seen: Counter[int] = Counter()
     passed = {channel for channel, number in numbers.items() if number < 0}
     with as_bag_error(file.path):
-        for block in file.blocks(passed, clock):
-            seen.update(block.sources.tolist())
-            unknown = ~np.isin(block.sources, list(numbers))
-            end = int(unknown.argmax()) if unknown.any() else len(block)
-            if end:
-                known = block.chosen(slice(0, end))
-                sources = np.array([numbers[channel] for channel in known.sources.tolist()])
-                yield replace(known, sources=sources, log_times=known.log_times + np.uint64(ahead))
-            if end < len(block):
-                raise KeyError(int(block.sources[end]))
+        for bound, number, block in file.parts(passed, clock):
+            seen.update(channels := block.sources.tolist())
+            sources = np.array([numbers[channel] for channel in channels], np.int64)
+            times = block.log_times + np.uint64(ahead)
+            yield Part(bound + ahead, number, replace(block, sources=sources, log_times=times))
         told = {channel: count for channel, count in file.counts.items() if channel not in passed}
         file.check_counts("statistics", told, "read", seen)
 
 
-def _merged(files: Sequence[Iterator[MessageBlock]]) -> Iterator[MessageBlock]:
-    """Yield blocks of the messages of all files, sorted by log time, then by file."""
-    filling = [(block for block in file if len(block)) for file in files]
-    waiting = [next(file, None) for file in filling]
-    while filled := [(number, block) for number, block in enumerate(waiting) if block is not None]:
-        last, first = min((block.log_times[-1], number) for number, block in filled)
-        due = []
-        for number, block in filled:
-            if block.log_times[0] <= last:
-                side: Literal["left", "right"] = "right" if number <= first else "left"
-                end = int(np.searchsorted(block.log_times, last, side))
-                due.append(block.chosen(slice(0, end)))
-                waiting[number] = block.chosen(slice(end, None))
-        yield by_log_time(joined([block for block in due if len(block)]))
-        waiting[first] = next(filling[first], None)
+def _in_order(paths: Sequence[Path], files: Sequence[Iterator[Part]]) -> Iterator[MessageBlock]:
+    """Yield blocks of the messages of all files, sorted by log time, then by file, then by their order in it."""
+    held: dict[tuple[int, int], MessageBlock] = {}  # blocks by file and part
+    for part, file in merge(*(zip(parts, repeat(file)) for file, parts in enumerate(files)), key=lambda each: each[0].bound):
+        ends = {at: int(np.searchsorted(block.log_times, np.uint64(part.bound))) for at, block in sorted(held.items())}
+        if due := [held[at].chosen(slice(0, end)) for at, end in ends.items() if end]:
+            yield by_log_time(joined(due))
+        held = {at: held[at].chosen(slice(end, None)) for at, end in ends.items() if end < len(held[at])}
+        held[file, part.number] = part.block
+        if sum(len(each.content) for each in held.values()) > MOST_HELD or sum(map(len, held.values())) > MOST_TOGETHER:
+            what = f"more than {MOST_HELD} bytes or {MOST_TOGETHER} messages are out of order"
+            raise BagError(f"{paths[file]}: {what}. Sort them by log time: `mcap sort IN.mcap -o OUT.mcap`.")
+    if held:
+        yield by_log_time(joined([block for _, block in sorted(held.items())]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -21,10 +20,10 @@ from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
 from ..twin.blocks import Integers
 from . import metadata as bagmeta
-from .mcap_file import NOTES, PROFILE
-from .mcap_records import MOST_HELD
+from .mcap_records import NOTES, PROFILE
 from .mcap_writer import McapWriter
 from .metadata import Recorded, WrittenFile, metadata_of
+from .session_file import MOST_HELD
 
 
 def claim_directory(directory: Path) -> None:
@@ -69,7 +68,6 @@ class BagWriter:
         self.counts: Counter[int] = Counter()
         self.sync: Callable[[int], None] = os.fsync  # puts a file that is complete on the disk, by its descriptor
         self._files: list[WrittenFile] = []
-        self._due = 0.0  # when metadata.yaml is written again at a split, s of `time.monotonic`
         self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
         claim_directory(directory)
@@ -137,20 +135,17 @@ class BagWriter:
         return self._span[0] if self._span else None
 
     def split(self) -> None:
-        """Complete the open file and begin the next one. Update ``metadata.yaml`` unless its last update was too recent."""
-        metadata_pause = 10.0  # between two writings of ``metadata.yaml``, in writing times, which grow with every file
+        """Complete the open file and begin the next one."""
         with self._as_bag_error():
             self._finish()
-            if (began := time.monotonic()) >= self._due:
-                self._write_metadata()
-                self._due = began + (1.0 + metadata_pause) * (time.monotonic() - began)
         self._open()
 
     def close(self) -> None:
         """Complete the file, then write ``metadata.yaml``."""
         with self._as_bag_error():
             self._finish()
-            self._write_metadata()
+            metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
+            bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata)
 
     def abandon(self) -> None:
         """Close the open file without its end; data in memory are lost."""
@@ -176,10 +171,6 @@ class BagWriter:
         for each in topics:
             number = self._schemas[each.type, each.definition_encoding, each.definition]
             self._channels.append(self._writer.register_channel(each.topic, each.encoding, number, each.details))
-
-    def _write_metadata(self) -> None:
-        metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
-        bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata, self.sync)
 
     def _finish(self) -> None:
         self._writer.finish()

@@ -19,7 +19,6 @@ from ..bag.session_model import session_yaml
 from ..errors import BagError, UsageError
 from ..system.atomic_files import DRAFT, write_atomic
 from ..system.received_files import real_path
-from ..system.result_folder import check_lasting
 from ..system.terminal_text import printable
 from .session_task import ALARM, Row
 
@@ -107,7 +106,6 @@ def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
     None of the sessions to be read may lie in `out`, nor `out` in one of them. BagError if `out` holds anything else, another
     batch works in it, or it cannot be written.
     """
-    check_lasting(out)
     place = real_path(out)
     for session in sessions:
         path = Path(os.path.realpath(session))

@@ -128,8 +128,8 @@ def proposal(found: Assignment, timezone: str | None) -> list[str]:
     lines += [f"timezone: {timezone}" if timezone else "# timezone: Europe/Berlin   # of local times", "time:"]
     for number, places in enumerate(found.times):
         table = found.tables[number]
-        names = [table.headers[place] for place in places]
-        unit = f", unit: {table.units[places[0]]}" if table.units[places[0]] else ""
+        names = [table.headers[place] for place in places] or ["GIVE_ONE"]
+        unit = f", unit: {table.units[places[0]]}" if places and table.units[places[0]] else ""
         lines.append(f"  - {{column: {_quoted(names if len(names) > 1 else names[0])}{unit}, file: {_file(found, number)}}}")
     lines.append("columns:")
     for use in sorted(found.used, key=lambda use: use.channel):

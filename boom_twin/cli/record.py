@@ -62,14 +62,12 @@ def run(args: Namespace) -> int:
     from ..ros.bag.subscriptions import resolved, resolved_mapping
     from ..ros.runtime import ros
     from ..ros.startup import on_stop_signal
-    from ..system.result_folder import check_lasting
 
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))
     known = load_mapping(args.mapping)
     wanted, metadata = _wanted(args, known), _metadata(args)
     given = {"origin": args.origin, "note": args.note, "rig": args.rig}
-    check_lasting(args.out)
     if args.out.is_dir() and (reason := incompleteness(args.out)):
         raise BoomTwinError(f"{args.out}: {reason} Record into a new directory.")
     with ros(ros_arguments(args)), recorder_node() as node:

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
+from ..loggers.log_table import CsvLogTable, columns_of
 from ..scene import Scene
-from ..system.csv_table import columns_text, read_csv
+from ..system.result_text import csv_text
 from ..types import Array
 from .arguments import add_json, add_place, add_scene, files_of, numbers
 from .output import open_scene, print_result, warn
@@ -96,7 +97,7 @@ def run(args: Namespace) -> int:
         warn(f"{doubt}.")
     if args.out:
         with result_folder(Path(args.out), RESPONSE, files_of(args, "scene", "load")) as building:
-            write_atomic(building / f"{answer.name}.csv", columns_text(answer.columns))
+            write_atomic(building / f"{answer.name}.csv", csv_text(answer.columns))
             answer.draw(building / f"{answer.name}.png")
         answer.lines.append(f"Written: {args.out}")
     print_result(args.json, answer.values | {"warnings": answer.doubts}, answer.lines)
@@ -197,10 +198,8 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
             )
         load, told = pump_load(scene, *args.pump), f"pump pulses of {args.pump[1]:g} N at {args.pump[0]:g} Hz"
     else:
-        table, wanted = read_csv(Path(args.load), UsageError), ["t_s", "fx_N", "fy_N"]
-        table.require(wanted)
-        times, *components = (np.array(table.column(name)) for name in wanted)
-        load = load_of_rows(times, np.column_stack(components))
+        rows = columns_of(CsvLogTable(Path(args.load)), ("t_s", "fx_N", "fy_N"))
+        load = load_of_rows(rows[:, 0], rows[:, 1:])
         told = f"{Path(args.load).name}, {1.0 / load.period:.4g} Hz"
     result = steady_state(scene, load, args.strokes, args.posture)
     title = f"Steady state: {told}, {_place(args)}"

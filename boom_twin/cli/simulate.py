@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import UsageError
+from ..loggers.log_table import CsvLogTable, columns_of
 from ..scene import Scene
 from ..system.atomic_files import check_target, write_atomic
-from ..system.csv_table import CsvTable, columns_text, read_csv
-from ..system.result_text import numbers
+from ..system.result_text import csv_text, numbers
 from ..types import Array
 from .arguments import add_json, add_scene, files_of, not_negative
 from .output import open_scene, print_result, warn
@@ -56,7 +56,7 @@ def run(args: Namespace) -> int:
     sources = files_of(args, "drive", "lengths", "force", "scene")
     check_target(Path(args.out), sources, _holds_simulation)
     times, strokes, stem = read_history(sources[0], len(scene.joints), ("length", "stroke") if args.lengths else ("stroke",))
-    pushed = None if args.force is None else _columns(read_csv(Path(args.force), UsageError), FORCE_COLUMNS)
+    pushed = None if args.force is None else columns_of(CsvLogTable(Path(args.force)), FORCE_COLUMNS)
     for oddity in odd_in_drive(times, strokes, stem):
         warn(f"{sources[0]}: {oddity}")
     angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0], bool(args.lengths))
@@ -65,7 +65,7 @@ def run(args: Namespace) -> int:
     result = simulate(scene, times, drives, args.dt, angles, rho, not args.no_error_estimate, lengths=lengths, force=pushed)
     for doubt in result.doubts:
         warn(f"{doubt}.")
-    write_atomic(Path(args.out), columns_text(result.columns()))
+    write_atomic(Path(args.out), csv_text(result.columns()))
     print_result(args.json, as_json(result, args.out), as_text(result, args.out))
     return 0
 
@@ -110,19 +110,14 @@ def _holds_simulation(start: bytes) -> bool:
 def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array, str]:
     """Return times (m,) in s, strokes or lengths (m, n) in m, and their column stem from a CSV file.
 
-    UsageError for another file. The stem is the first of `stems` in the header.
+    BagError for another file. The stem is the first of `stems` in the header.
     """
-    table = read_csv(path, UsageError)
-    stem = next((stem for stem in stems if f"{stem}_1_m" in table.names), stems[0])
-    if (more := f"{stem}_{n + 1}_m") in table.names:
+    table = CsvLogTable(path)
+    stem = next((stem for stem in stems if f"{stem}_1_m" in table.headers), stems[0])
+    if (more := f"{stem}_{n + 1}_m") in table.headers:
         raise UsageError(f"{path}: column {more}, but the scene has {n} cylinders. Give the scene of this boom, or remove it.")
-    found = _columns(table, ("t_s", *(f"{stem}_{i + 1}_m" for i in range(n))))
+    found = columns_of(table, ("t_s", *(f"{stem}_{i + 1}_m" for i in range(n))))
     return found[:, 0], found[:, 1:], stem
-
-
-def _columns(table: CsvTable, names: Sequence[str]) -> Array:
-    table.require(names)
-    return np.column_stack([table.column(name) for name in names])
 
 
 def odd_in_drive(times: Array, strokes: Array, stem: str = "stroke") -> list[str]:

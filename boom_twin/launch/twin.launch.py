@@ -22,7 +22,6 @@ from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.urdf import RVIZ, urdf
 from boom_twin.scene import Scene, load_scene
 from boom_twin.system.processes import python_command
-from boom_twin.system.result_folder import check_lasting
 
 FLAG = ("true", "false")
 FLAG_OR_FILE = (*FLAG, "")
@@ -142,7 +141,6 @@ def rviz(given: Given, values: Values) -> IncludeLaunchDescription:
 
 def recorder(given: Given, values: Values) -> ExecuteProcess:
     """Return the recorder beside the node, with the node's scene, parameters, mapping and namespace."""
-    check_lasting(Path(given["record"]))
     options = {"--out": given["record"], "--scene": given["scene"], "--params": given["params_file"]}
     options |= {"--mapping": values["mapping"], "--namespace": given["namespace"]}
     command = python_command("boom_twin.cli.main", "record")

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import BagError
-from ..system.csv_table import NOTHING, CsvLayout, marked_encoding
 from ..types import NUMBER, SENSORS, Stream, stream_of
 
 UNIT_NAMES = {
@@ -168,18 +167,26 @@ def _folded(name: str) -> str:
 HEAD = 2**18  # bytes read to detect the layout
 SEPARATORS = {"\t": "tab", ";": ";", ",": ",", "|": "|"}
 """Names of separators in order of trial: first tab and ; (never decimal marks)."""
-BLANKS = NOTHING | {"--", "---", "-nan", "1.#qnan", "-1.#ind", "#nv", "#wert!", "#div/0!", "#num!", "#value!", "inf", "-inf"}
+BLANKS = {
+    "", "-", "--", "---", "nan", "-nan", "null", "none", "na", "n/a", "#n/a", "1.#qnan", "-1.#ind", "#nv", "#wert!", "#div/0!",
+    "#num!", "#value!", "inf", "-inf",
+}  # fmt: skip
 """Texts of cells without a value, in lower case."""
+_MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+"""Encodings by the byte order mark at the start of a file."""
 _NUMBER = re.compile(r"[+-]?(\d[\d'. ]*([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE)
 _MOMENT = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}.*|.*\d{1,2}:\d{2}.*")
-_GROUPING = re.compile(r"(?<=\d)[ '\u00a0\u202f](?=\d{3})")
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 
 @dataclass(frozen=True, slots=True)
-class LoggerLayout(CsvLayout):
-    """Layout of a logger's file, with the units of its columns and its first rows."""
+class CsvLayout:
+    """How a CSV file is written, with its header and its first rows."""
 
+    encoding: str
+    separator: str
+    names: list[str]  # headers of its columns
+    first_line: int  # line of its first row of data, from 1
     units: list[str]
     """Units from the row of units, or empty strings. Known units have this package's spelling."""
     is_comma: bool  # True if the decimal mark is a comma
@@ -202,7 +209,7 @@ class LoggerLayout(CsvLayout):
         return f"{self.encoding}, separator {SEPARATORS[self.separator]}, {mark}, header in line {self.header_line}"
 
 
-def layout_of(path: Path) -> LoggerLayout:
+def layout_of(path: Path) -> CsvLayout:
     """Return the layout of a file. Raise BagError if there is no table of numbers with a header in it."""
     try:
         encoding = _encoding(path)
@@ -227,11 +234,11 @@ def layout_of(path: Path) -> LoggerLayout:
 
 def _encoding(path: Path) -> str:
     """Return the encoding by the byte order mark, else by the bytes."""
-    if marked := marked_encoding(path):
-        return marked
     decoder = codecs.getincrementaldecoder("utf-8")()
     with path.open("rb") as file:
         head = file.read(HEAD)
+        if marked := next((encoding for mark, encoding in _MARKS.items() if head.startswith(mark)), ""):
+            return marked
         first, second = head[::2].count(0), head[1::2].count(0)
         if abs(first - second) > len(head) // 4:
             return "utf-16-le" if second > first else "utf-16-be"
@@ -246,7 +253,7 @@ def _encoding(path: Path) -> str:
     return "utf-8"
 
 
-def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout | None:
+def _table(path: Path, text: str, separator: str, encoding: str) -> CsvLayout | None:
     """Return the layout if `text` is a table with this separator, else None."""
     try:
         reader = csv.reader(StringIO(text, newline=""), delimiter=separator, skipinitialspace=True)
@@ -284,7 +291,7 @@ def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout
     cells = [row[place] for row in samples for place in numeric if place < len(row) and not _MOMENT.fullmatch(row[place])]
     given = [units.get(place, "") for place in range(len(names))]
     is_comma = _has_decimal_comma(path, cells, separator)
-    return LoggerLayout(encoding, separator, names, rows[first - 1][0] + 1, given, is_comma, samples[:200], line, head)
+    return CsvLayout(encoding, separator, names, rows[first - 1][0] + 1, given, is_comma, samples[:200], line, head)
 
 
 def _headers(above: list[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
@@ -333,19 +340,7 @@ def _has_decimal_comma(path: Path, cells: Sequence[str], separator: str) -> bool
     if both := [cell for cell in with_comma if "." in cell]:
         return all(cell.rfind(",") > cell.rfind(".") for cell in both)
     points = [cell for cell in cells if "." in cell]
-    if with_comma and points and all(map(_THOUSANDS.fullmatch, with_comma)):
+    if with_comma and points and all(map(THOUSANDS.fullmatch, with_comma)):
         told = f"the comma in {with_comma[0]!r} is a separator of thousands or a decimal mark, beside {points[0]!r}"
         raise BagError(f"{path}: {told}. Export all numbers with one decimal mark.")
     return bool(with_comma) or not (points or separator == ",")
-
-
-def number_in(cell: str, is_comma: bool) -> float:
-    """Return the number of a cell, NaN if blank. Raise ValueError for any other text or an ambiguous number."""
-    text = _GROUPING.sub("", cell.strip())
-    if text.lower() in BLANKS:
-        return float("nan")
-    if is_comma:
-        if "." in text and "," not in text and _THOUSANDS.fullmatch(text.replace(".", ",")):
-            raise ValueError("a separator of thousands or a decimal mark")
-        return float(text.replace(".", "").replace(",", ".") if "," in text else text)
-    return float(text.replace(",", "") if _THOUSANDS.fullmatch(text.partition(".")[0]) else text)

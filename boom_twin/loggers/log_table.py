@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import csv
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BagError, BoomTwinError, UsageError
-from ..system.csv_table import CsvTable, read_csv_pieces
 from ..system.received_files import open_received
 from ..types import Array
-from .csv_layout import layout_of, number_in, split_header, unit_of
+from .csv_layout import BLANKS, THOUSANDS, CsvLayout, layout_of, split_header, unit_of
+
+TOGETHER = 4096  # rows of a CSV file in memory
+LONGEST_LINE = 2**16  # limit for the number of characters in a line
+_GROUPING = re.compile(r"(?<=\d)[ '\u00a0\u202f](?=\d{3})")
 
 Times = list[str] | NDArray[Any]  # cells of a column of times: texts, numbers in a unit, or `datetime64`
 
@@ -61,6 +67,58 @@ class LogTable(ABC):
         """Return all rows of some columns, NaN for an empty cell. Raise BagError for a cell that is no number."""
 
 
+class _Piece(NamedTuple):
+    """Some rows of a CSV file, with their line numbers, from 1."""
+
+    rows: list[list[str]]
+    lines: list[int]
+    is_ended: bool  # False if the last row is the last of the file, and has no line end
+
+
+class _Lines:
+    """Iterator of the lines of a file, which checks their lengths. A line with NULs, as after a power cut, is one NUL."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._file, self.is_ended = file, True
+
+    def __iter__(self) -> Iterator[str]:
+        number = 0
+        while line := self._file.readline(LONGEST_LINE):
+            number += 1
+            self.is_ended = line.endswith(("\n", "\r"))
+            line = "\0\n" if "\0" in line else line
+            if len(line) == LONGEST_LINE and not self.is_ended:
+                raise csv.Error(f"line {number} is longer than {LONGEST_LINE} characters")
+            yield line
+
+
+def _pieces(path: Path, layout: CsvLayout) -> Iterator[_Piece]:
+    """Yield the rows below the header, up to `TOGETHER` at a time, so that a file of any size takes little memory."""
+    try:
+        with path.open(encoding=layout.encoding, newline="") as file:
+            lines = _Lines(file)
+            reader = csv.reader(lines, delimiter=layout.separator, skipinitialspace=True)
+            found = ((reader.line_num, row) for row in reader if row and reader.line_num >= layout.first_line)
+            while some := list(islice(found, TOGETHER)):
+                yield _Piece([row for _, row in some], [line for line, _ in some], lines.is_ended)
+    except UnicodeError as reason:
+        raise BagError(f"{path}: its encoding cannot be read ({reason}). Save it as UTF-8.") from None
+    except (OSError, csv.Error) as reason:
+        raise BagError(f"{path}: {getattr(reason, 'strerror', None) or reason}. Give a CSV file.") from None
+
+
+def _number_in(cell: str, is_comma: bool) -> float:
+    """Return the number of a cell, NaN if blank. Raise ValueError for any other text or an ambiguous number."""
+    text = _GROUPING.sub("", cell.strip())
+    if text.lower() in BLANKS:
+        return float("nan")
+    if is_comma:
+        if "." in text and "," not in text and THOUSANDS.fullmatch(text.replace(".", ",")):
+            raise ValueError("a separator of thousands or a decimal mark")
+        return float(text.replace(".", "").replace(",", ".") if "," in text else text)
+    return float(text.replace(",", "") if THOUSANDS.fullmatch(text.partition(".")[0]) else text)
+
+
 class CsvLogTable(LogTable):
     """Table of a CSV file, see `boom_twin.loggers.csv_layout.layout_of`."""
 
@@ -75,7 +133,7 @@ class CsvLogTable(LogTable):
         """See `LogTable`. A truncated last line, comments and repeated headers are left out."""
         parts: dict[int, list[Array]] = {place: [] for place in numbers}
         found = LogRows({}, {place: [] for place in times})
-        for piece in read_csv_pieces(self._path, BagError, layout=self._layout):
+        for piece in _pieces(self._path, self._layout):
             rows, lines = self._usable(piece, found)
             found.lines += lines
             for place in numbers:
@@ -85,9 +143,9 @@ class CsvLogTable(LogTable):
         found.numbers = {place: np.concatenate(arrays) for place, arrays in parts.items()}
         return found
 
-    def _usable(self, piece: CsvTable, found: LogRows) -> tuple[list[list[str]], list[int]]:
+    def _usable(self, piece: _Piece, found: LogRows) -> tuple[list[list[str]], list[int]]:
         """Return rows padded with blanks to the length of the header, and their line numbers."""
-        width, rows, lines = len(piece.names), list[list[str]](), list[int]()
+        width, rows, lines = len(self._layout.names), list[list[str]](), list[int]()
         for row, line in zip(piece.rows, piece.lines, strict=True):
             cells = [cell.strip() for cell in row]
             if len(row) < width and not piece.is_ended and line == piece.lines[-1]:
@@ -113,7 +171,7 @@ class CsvLogTable(LogTable):
         is_comma, values = self._layout.is_comma, np.empty(len(rows))
         for number, row in enumerate(rows):
             try:
-                values[number] = number_in(row[place], is_comma)
+                values[number] = _number_in(row[place], is_comma)
             except ValueError as reason:
                 told = "is a separator of thousands or a decimal mark" if "thousands" in str(reason) else "is not a number"
                 raise BagError(
@@ -121,6 +179,20 @@ class CsvLogTable(LogTable):
                     "Correct the cell, or empty it if there is no value."
                 ) from None
         return values
+
+
+def columns_of(table: CsvLogTable, names: Sequence[str]) -> Array:
+    """Return the columns with these headers, shape (rows, columns). Raise BagError if one is missing or lacks a value."""
+    if missing := [name for name in names if name not in table.headers]:
+        there = ", ".join(header for header in table.headers if header)
+        raise BagError(f"{table.source}: no column {', '.join(missing)}, but {there}. It needs {','.join(names)}.")
+    found = table.read(places := [table.headers.index(name) for name in names], [])
+    values = np.column_stack([found.numbers[place] for place in places])
+    if found.remark:
+        raise BagError(f"{table.source}: {found.remark} by an import. Remove the line.")
+    for row, column in np.argwhere(np.isnan(values)):
+        raise BagError(f"{table.source}, {found.place(row)}: {names[column]} has no value. Give one in every row.")
+    return values
 
 
 class ArrayTable(LogTable):

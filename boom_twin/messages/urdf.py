@@ -20,35 +20,6 @@ TIP, TIP_RIGID, TIP_ALONG, TIP_ACROSS, IMU = "tip", "tip_rigid", "tip_along", "t
 UP_IS_POSITIVE = "0 -1 0"  # axis of every revolute joint (REP-103: x forward, z up): a positive angle raises what it turns
 COLOURS = {"section": "0.55 0.62 0.70 1", "link": "0.35 0.40 0.46 1", "barrel": "0.90 0.45 0.10 1", "rod": "0.80 0.82 0.85 1"}
 
-ABOUT = """
-Made from a scene file by `boom_twin urdf`; change the scene, not this file. Frames by REP-103: x forward, z up, the
-boom in the x-z plane; metres and radians. Zero of every section: in line with the one before.
-
-Links                  origin, and direction of x
-  base_link            as in the scene, in the axes of the base
-  section_i            inboard pivot, towards the outboard pivot
-  tip                  outboard pivot of the deflected boom, as its last head; tip_rigid that of straight sections,
-                       tip_along and tip_across lie between
-  imu_link             the tip IMU, as tip
-  cylinder_i_barrel    barrel pin, towards the rod pin
-  cylinder_i_rod       rod pin, away from the barrel pin
-  link_l_i, link_r_i   pin D, pin E, towards pin Q where the two links meet (joints B1, B2, B3)
-
-Joints                 published in ~/joint_states
-  joint_i              every message: predicted, root of section i against head of section i-1
-  cylinder_i           every message: estimated stroke, 0 = closed
-  tip_dx, tip_dz       every message: from tip_rigid to the predicted tip, along and across the last section
-  tip_pitch            every message: the last head against its section's x
-  cylinder_i_swivel    with every ~/shape (20 Hz): the barrel in section i-1 (i = 1: in the base)
-  link_l_i_swivel      likewise: link L in section i-1
-  link_r_i_swivel      likewise: link R in section i
-
-A URDF is a tree, so rod pins and pins Q are not joints here. The published positions of the swivels close these loops, for
-rigid sections; mimic joints could not, because they are linear. Sections are drawn straight, and only tip and imu_link are
-where the deflected boom has them: see ~/shape for how it bends. A scene tells no limits of effort and velocity; the zeros
-stand for that. No inertia: see `boom_twin check`.
-"""
-
 ELASTIC_BASE = """
 This scene has an elastic base. Sections, links and cylinders are drawn on the unloaded base; only tip and imu_link, and
 ~/shape, have its turn.
@@ -62,7 +33,7 @@ def urdf(scene: Scene) -> str:
     `boom_twin.scene.kinematics.PassiveJoints`.
     """
     robot = Element("robot", name=NAME)
-    robot.append(ElementTree.Comment(ABOUT))
+    robot.append(ElementTree.Comment(f"\n{ABOUT.read_text()}"))
     if scene.base.stiffness is not None:
         robot.append(ElementTree.Comment(ELASTIC_BASE))
     for name, rgba in COLOURS.items():
@@ -189,6 +160,7 @@ def _number(value: float) -> str:
 FOLDER = Path(str(files("boom_twin") / "msg_config"))
 RVIZ, FOXGLOVE, PLOTJUGGLER = (FOLDER / name for name in ("boom_twin.rviz", "foxglove.json", "plotjuggler.xml"))
 VIEWS = (RVIZ, FOXGLOVE, PLOTJUGGLER)
+ABOUT = FOLDER / "urdf.txt"  # explanation at the top of every URDF
 DESCRIPTION = "/robot_description"  # topic of robot_state_publisher
 TF_PREFIX = "TF Prefix:"  # key of the frame prefix in RViz's display of a robot model
 

@@ -19,17 +19,16 @@ HEAD = 4096  # number of first bytes of a file that identify an earlier result
 _RECORDINGS = frozenset({".mcap", ".db3", ".bag"})
 _BESIDE_THEM = frozenset({"metadata.yaml", "session.yaml", "truth.csv.gz"})
 
-SYNCED_AT_END = set[Path]()  # folders under construction, whose files are synced together
 _umask = os.umask(0)
 os.umask(_umask)
 
 
-def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] = os.fsync) -> None:
+def write_atomic(path: Path, content: str | bytes) -> None:
     """Write a file as a temporary one beside it, which is synced to the disk and then renamed; BagError if it cannot be.
 
     `path` has the old content or the new one at any time, also after a kill or the loss of power. A path that is no regular
     file (``/dev/stdout``, a pipe) is written to directly. The target of a symbolic link is replaced. Text is encoded as UTF-8,
-    its surrogates (bytes of a path) as escapes. `sync` syncs the file with a descriptor to the disk, outside `SYNCED_AT_END`.
+    its surrogates (bytes of a path) as escapes.
     """
     data = content.encode(errors="backslashreplace") if isinstance(content, str) else content
     try:
@@ -37,7 +36,7 @@ def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] =
             with path.open("wb") as stream:
                 stream.write(data)
             return
-        _replace(path.resolve(), data, sync)
+        _replace(path.resolve(), data)
     except OSError as error:
         remedy = "Make room on the disk, or choose another place."
         if isinstance(error, FileNotFoundError):
@@ -81,11 +80,11 @@ def _is_recording(path: Path) -> bool:
     return not _RECORDINGS.isdisjoint(path.suffixes[-2:])
 
 
-def sync_folder(folder: Path, sync: Callable[[int], None] = os.fsync) -> None:
+def sync_folder(folder: Path) -> None:
     """Sync the entries of a folder to the disk, if its file system supports that."""
     handle = os.open(folder, os.O_RDONLY)
     try:
-        sync(handle)
+        os.fsync(handle)
     except OSError as error:
         if error.errno not in (errno.EINVAL, errno.ENOTSUP):
             raise
@@ -93,9 +92,7 @@ def sync_folder(folder: Path, sync: Callable[[int], None] = os.fsync) -> None:
         os.close(handle)
 
 
-def _replace(path: Path, data: bytes, sync: Callable[[int], None]) -> None:
-    if not SYNCED_AT_END.isdisjoint(path.parents):
-        sync = lambda _: None  # noqa: E731
+def _replace(path: Path, data: bytes) -> None:
     handle, name = mkstemp(prefix=f".{path.name}.", suffix=DRAFT, dir=path.parent)
     draft = Path(name)
     try:
@@ -104,10 +101,10 @@ def _replace(path: Path, data: bytes, sync: Callable[[int], None]) -> None:
             stream.flush()
             with suppress(PermissionError):  # of a file system without permissions
                 os.fchmod(stream.fileno(), stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask)
-            sync(stream.fileno())
+            os.fsync(stream.fileno())
         draft.replace(path)
     except BaseException:
         with suppress(OSError):
             draft.unlink()
         raise
-    sync_folder(path.parent, sync)
+    sync_folder(path.parent)

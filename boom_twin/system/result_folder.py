@@ -1,8 +1,8 @@
 """Result folders: built beside their place, renamed when whole, replaced only by their own command; marks of incomplete ones.
 
-A command builds ``OUT.unfinished`` beside ``OUT``. In it ``unfinished.json`` names the command. That file is locked as long as
-the command lives. So a second command is refused, and a remainder of a killed one is not taken for work in
-progress. At the end ``manifest.json`` lists every file with its SHA-256, and the folder is renamed to ``OUT``.
+A command builds a new folder beside ``OUT``: ``OUT.unfinished``, or with a number behind that name if it is taken. In it
+``unfinished.json`` names the command. At the end ``manifest.json`` lists every file with its SHA-256, and the folder is
+renamed to ``OUT``. A killed command leaves its folder, and no command uses or removes it.
 
 An earlier result must be exactly as its manifest says. It is moved to ``OUT.replaced`` first and removed last. After a kill at
 any time one of the two results is whole, and the next run of the command restores its name.
@@ -11,7 +11,6 @@ any time one of the two results is whole, and the next run of the command restor
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import os
 from collections.abc import Iterator, Sequence
@@ -21,7 +20,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ..errors import BagError
-from .atomic_files import DRAFT, SYNCED_AT_END, sync_folder, write_atomic
+from .atomic_files import sync_folder, write_atomic
 from .received_files import real_path, sha256_of
 
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
@@ -41,15 +40,8 @@ class ResultKind:
     """True if a later run replaces the result. If not, it is a recording, which has no manifest and is never replaced."""
 
     def has(self, name: str) -> bool:
-        """Return True if a path is one of its files, or a draft beside them."""
-        last = name.rpartition("/")[2]
-        is_draft = last.startswith(".") and last.endswith(DRAFT) and _folders(name)[0] in _folders(*self.files)
-        return is_draft or any(name.count("/") == each.count("/") and fnmatchcase(name, each) for each in self.files)
-
-
-def _folders(*names: str) -> list[str]:
-    """Return the folders of files, innermost first, each with a slash at its end; ``./`` is the folder of the result."""
-    return [f"{parent}/" for name in names for parent in Path(name).parents]
+        """Return True if a path is one of its files."""
+        return any(name.count("/") == each.count("/") and fnmatchcase(name, each) for each in self.files)
 
 
 _SESSION = ("session_*.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz")
@@ -77,57 +69,56 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
 
     After an exception the new folder is removed, and `out` is unchanged. `out` is missing, empty, or an earlier result of the
     same command. None of the `sources` that the command reads may lie in it, nor it in a session. BagError if `out` holds
-    anything else, another command is at work on it, or it cannot be written.
+    anything else, or it cannot be written.
     """
     place = real_path(out)
-    check_lasting(out)
     if not place.name or os.path.ismount(place):
         raise BagError(f"{out}: results are built beside it, and it cannot be renamed. Name a folder inside it.")
     if place.exists() and place.samefile(Path.cwd()):
         raise BagError(f"{out}: is the current folder, which would be renamed. Name another, or go up by one.")
-    building, replaced = (place.with_name(place.name + end) for end in (BUILDING, REPLACED))
-    for folder in (place, building, replaced):
+    replaced = place.with_name(place.name + REPLACED)
+    for folder in (place, replaced):
         _check_sources(out, folder, sources)
-    with _locked(building, kind) as lock:
-        try:
-            note = {"command": kind.command, "state": "unfinished; if no such command runs, a run that was stopped left this"}
-            os.truncate(lock, 0)
-            os.pwrite(lock, json.dumps(note).encode() + b"\n", 0)
-            os.fsync(lock)
-            _check_earlier(replaced, kind)
-            if replaced.exists() and not place.exists():  # a kill came between the two renames of a replacement
-                replaced.rename(place)
-            _check_earlier(place, kind)
-            _discard(replaced)
+    _check_earlier(replaced, kind)
+    if replaced.exists() and not place.exists():  # a kill came between the two renames of a replacement
+        replaced.rename(place)
+    _check_earlier(place, kind)
+    _discard(replaced)
+    building = _new_folder(place)
+    try:
+        note = {"command": kind.command, "state": "unfinished; if no such command runs, a run that was stopped left this"}
+        (building / UNFINISHED).write_text(json.dumps(note) + "\n")
+        yield building
+        _complete(building, kind)
+    except BaseException as error:
+        with suppress(OSError):
             _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
-            SYNCED_AT_END.add(building)
-            yield building
-            SYNCED_AT_END.remove(building)
-            _complete(building, kind)
-        except BaseException as error:
-            SYNCED_AT_END.discard(building)
-            with suppress(OSError):
-                _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
-                (building / UNFINISHED).unlink()
-                _remove_empty(building)
-            if isinstance(error, OSError) and error.errno in FULL and not error.filename:
-                remedy = "Make room on the disk, or choose another place."
-                raise BagError(f"{out}: cannot be written ({os.strerror(error.errno)}). {remedy}") from None
-            raise
-        _put_in_place(out, place, building, replaced, kind)
+            (building / UNFINISHED).unlink()
+            _remove_empty(building)
+        if isinstance(error, OSError) and error.errno in FULL and not error.filename:
+            remedy = "Make room on the disk, or choose another place."
+            raise BagError(f"{out}: cannot be written ({os.strerror(error.errno)}). {remedy}") from None
+        raise
+    _put_in_place(out, place, building, replaced, kind)
+
+
+def _new_folder(place: Path) -> Path:
+    """Make a folder beside a result, with a name that is not taken."""
+    number, building = 1, place.with_name(place.name + BUILDING)
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        while os.path.lexists(building):
+            number += 1
+            building = place.with_name(f"{place.name}{BUILDING}{number}")
+        building.mkdir()
+    except OSError as error:
+        raise BagError(f"{building}: cannot be made ({error.strerror}). Choose a folder that can be written.") from None
+    return building
 
 
 def is_unfinished(folder: Path) -> bool:
     """Return True if a folder is marked as unfinished and has no manifest."""
     return (folder / UNFINISHED).is_file() and not (folder / MANIFEST).is_file()
-
-
-def check_lasting(out: Path) -> None:
-    """Raise BagError for a place inside an unfinished result: the next run of its command would remove files there."""
-    place = real_path(out)
-    if (found := next(filter(is_unfinished, (place, *place.parents)), None)) is not None:
-        told = f"lies in an unfinished result, which its command removes when it runs again ({found / UNFINISHED})"
-        raise BagError(f"{out}: {told}. Choose another folder.")
 
 
 def _check_sources(out: Path, folder: Path, sources: Sequence[Path]) -> None:
@@ -137,7 +128,7 @@ def _check_sources(out: Path, folder: Path, sources: Sequence[Path]) -> None:
     """
     own: dict[tuple[int, int], str] = {}
     for name in _entries(folder):
-        with suppress(FileNotFoundError):  # a draft of another run, at work there
+        with suppress(FileNotFoundError):  # another run may be at work there
             own[_identity(folder / name)] = name
     for source in sources:
         real = real_path(source)
@@ -170,7 +161,7 @@ def _check_earlier(folder: Path, kind: ResultKind) -> None:
     if command != kind.command or listed is None:
         raise BagError(f"{folder}: holds {entries[0]}, and no manifest of `boom_twin {kind.command}`. {remedy}.")
     own = {name for name in listed if kind.has(name)}  # a manifest may come with a recording, and say anything
-    folders = set(_folders(*own))
+    folders = {f"{parent}/" for name in own for parent in Path(name).parents}
     for name in entries:
         if name not in own and name not in folders and name not in (MANIFEST, UNFINISHED):
             raise BagError(f"{folder}: holds {name}, which {command} did not write. {remedy}.")
@@ -206,51 +197,6 @@ def _note(path: Path) -> tuple[str, dict[str, str] | None]:
         return str(content["command"]), listed
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return "", None
-
-
-@contextmanager
-def _locked(building: Path, kind: ResultKind) -> Iterator[int]:
-    marker = building / UNFINISHED
-    try:
-        building.parent.mkdir(parents=True, exist_ok=True)
-        if building.is_symlink():
-            raise BagError(f"{building}: is a link, and results are built there. Move it away.")
-        building.mkdir(exist_ok=True)
-        _check_left(building, kind)
-        lock = os.open(marker, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
-    except OSError as error:
-        raise BagError(f"{building}: cannot be made ({error.strerror}). Choose a folder that can be written.") from None
-    try:
-        if not _is_taken(lock, marker):
-            raise BagError(f"{building}: another `boom_twin {kind.command}` is at work there. Wait for its end.")
-        _check_left(building, kind)
-        yield lock
-    finally:
-        os.close(lock)
-
-
-def _is_taken(lock: int, marker: Path) -> bool:
-    """Lock the open marker; False if another process has it, or it was renamed or removed meanwhile."""
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return os.path.samestat(marker.stat(), os.fstat(lock))
-    except (BlockingIOError, FileNotFoundError):
-        return False
-    except OSError as error:
-        raise BagError(f"{marker}: cannot be locked ({error.strerror}). Choose another disk.") from None
-
-
-def _check_left(building: Path, kind: ResultKind) -> None:
-    """Refuse a folder that a killed run of the same command cannot have left."""
-    entries = _entries(building)
-    remedy = "Move it away, or choose another folder: results are built there"
-    if entries and entries != [UNFINISHED] and _note(building / UNFINISHED)[0] != kind.command:
-        raise BagError(f"{building}: holds {entries[0]}, and no `boom_twin {kind.command}` left it. {remedy}.")
-    for name in entries:
-        if not (kind.has(name) or name in (*_folders(*kind.files), MANIFEST, UNFINISHED)):
-            raise BagError(f"{building}: holds {name}, which {kind.command} does not write. {remedy}.")
-    if not kind.is_replaced and MANIFEST in entries:
-        raise BagError(f"{building}: holds a whole result of `boom_twin {kind.command}`. Rename it, or choose another folder.")
 
 
 def _remove(folder: Path, names: Sequence[str]) -> None:

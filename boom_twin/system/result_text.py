@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, is_dataclass
 from html import escape
+from io import StringIO
 from math import isfinite
 from typing import Any
 
@@ -47,6 +48,15 @@ def data_frame(columns: Mapping[str, Any]) -> Any:
         remedy = 'Run `pip install "boom_twin[notebook]"`, or take columns().'
         raise UsageError(f"to_frame needs pandas ({error}). {remedy}") from None
     return DataFrame(dict(columns))
+
+
+def csv_text(columns: Mapping[str, Any]) -> str:
+    """Return the text of a CSV file of `columns`, arrays of shape (rows,), with their names as its header."""
+    import numpy as np
+
+    text = StringIO(newline="")
+    np.savetxt(text, np.column_stack(list(columns.values())), fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
+    return text.getvalue()
 
 
 def json_text(value: Any, indent: int | None = None, separators: tuple[str, str] | None = None) -> str:

@@ -122,6 +122,11 @@ def test_metadata_that_cannot_be_used_is_refused(bag: Path, old: str, new: str, 
     assert words in refusal(bag, content)
 
 
+def test_a_file_that_the_metadata_does_not_name_is_refused(bag: Path, content: Content) -> None:
+    shutil.copy(bag / FILE_NAME, bag / "session_1.mcap")
+    assert "metadata.yaml does not name session_1.mcap: the recorder was ended by force" in refusal(bag, content)
+
+
 def test_nothing_there(tmp_path: Path, content: Content) -> None:
     assert "no such file or directory" in refusal(tmp_path / "none", content)
     (tmp_path / "notes.txt").write_text("x")

@@ -21,7 +21,7 @@ from recordings import METADATA, SESSION_YAML, MessageWriter, read, recover, sca
 from ros_messages import load_topics
 
 from boom_twin import BagError, Stream
-from boom_twin.bag import mcap_file, mcap_records
+from boom_twin.bag import mcap_records, session_file
 from boom_twin.bag.mcap_records import LARGEST_SUMMARY
 from boom_twin.config.yaml_text import plain
 from boom_twin.offline import ground_truth as truth
@@ -138,7 +138,7 @@ def test_lengths_beyond_the_message_are_refused(tmp_path: Path, kind: str, capsy
 
 def test_too_many_messages_out_of_order_are_not_held(bag: Path, monkeypatch: pytest.MonkeyPatch, rewritten: Any) -> None:
     file = rewritten(bag, backwards=True)
-    monkeypatch.setattr(mcap_file, "MOST_TOGETHER", 3)
+    monkeypatch.setattr(session_file, "MOST_TOGETHER", 3)
     with pytest.raises(BagError, match="3 messages are out of order"):
         list(read(scan(file), {"cylinder_strokes": JOINT_STATE}))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -121,3 +122,17 @@ def test_statics_tells_lengths_beside_drives(capsys: pytest.CaptureFixture[str])
         assert at_lengths[key] == pytest.approx(at_drives[key], rel=1e-9), key
     assert main(["statics", f"--lengths={lengths}"]) == 0
     assert "drive m    length m" in capsys.readouterr().out
+
+
+def test_a_drive_may_have_semicolons_and_decimal_commas_and_no_gaps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    drive = tmp_path / "drive.csv"
+    written(drive, TIMES[:20], STROKES[:20])
+    text, outs = drive.read_text(), [tmp_path / "out.csv", tmp_path / "other.csv"]
+    for out, given in zip(outs, (text, text.replace(",", ";").replace(".", ",")), strict=True):
+        drive.write_text(given)
+        assert main(["simulate", "--drive", str(drive), "--out", str(out), "--no-error-estimate"]) == 0
+    assert outs[0].read_bytes() == outs[1].read_bytes()
+    for cell, told in (("", "stroke_1_m has no value"), ("x", "stroke_1_m = 'x' is not a number")):
+        drive.write_text(re.sub(r"(?m)^0.01,[^,]*", f"0.01,{cell}", text))
+        assert main(["simulate", "--drive", str(drive), "--out", str(outs[0])]) == 1
+        assert f"line 3: {told}" in capsys.readouterr().err

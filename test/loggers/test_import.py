@@ -256,6 +256,10 @@ FAULTS = {
     "no header": (GOOD.partition("\n")[2], "numbers stand in its first line"),
     "numbers above": ("\n".join([*GOOD.splitlines()[1:20], GOOD]), "rows of numbers stand above the header in line 20. Cut"),
     "no table": ("nothing\nto see", "no table found. The file begins with 'nothing'"),
+    "a gyro": (
+        "\n".join(f"{row};{'0,1' if k else 'tip_imu_rate'}" for k, row in enumerate(GOOD.splitlines())),
+        "tip_imu_rate: has no topic.",
+    ),
     "no time": (GOOD.replace("Zeit", "Nr"), "no column of times among"),
     "ms or s": (table([TIMELESS], lambda row: f"{0.15 * row:.2f}", numbers(",", 4)), "the times may be in s or ms"),
     "some times with an offset": (
@@ -272,6 +276,12 @@ def test_what_cannot_be_known_is_refused_with_its_place(tmp_path: Path, fault: s
     (tmp_path / "log.csv").write_text(text)
     assert main(["import", str(tmp_path / "log.csv"), "--out", str(tmp_path / "s")]) == 1
     assert words in capsys.readouterr().err and not (tmp_path / "s").exists()
+
+
+def test_a_proposal_asks_for_a_column_of_times_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "log.csv").write_text("cylinder_1 [mm];cylinder_2 [mm]\n1,5;2,5\n1,6;2,6\n")
+    assert main(["import", str(tmp_path / "log.csv"), "--propose"]) == 0
+    assert '  - {column: "GIVE_ONE", file: "log.csv"}' in capsys.readouterr().out
 
 
 LINES = GOOD.splitlines()
