@@ -17,7 +17,6 @@ from launch.actions import (
     TimerAction,
 )
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import ThisLaunchFileDir
 
 from boom_twin.bag.advice import publishable
 from boom_twin.bag.reader import scan
@@ -39,7 +38,7 @@ KEPT = {"scene": "scene:=FILE", "mapping": "mapping:=FILE"}  # files that the se
 
 def generate_launch_description() -> LaunchDescription:
     """Return the arguments above, the twin on simulated time and the player. All of them end with the session."""
-    twin = IncludeLaunchDescription(PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/twin.launch.py"]))
+    twin = IncludeLaunchDescription(PythonLaunchDescriptionSource(str(Path(__file__).with_name("twin.launch.py"))))
     return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=prepare), twin, OpaqueFunction(function=player)])
 
 
