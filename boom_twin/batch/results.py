@@ -84,7 +84,6 @@ class RigSummary:
 
 
 def rigs_of(rows: Sequence[Row]) -> list[RigSummary]:
-    """Return a summary of each rig with a finished session, sorted by name."""
     return [_summary(rig, found) for rig, found in _finished_by_rig(rows)]
 
 
@@ -172,7 +171,6 @@ def write_rigs(path: Path, rigs: Sequence[RigSummary]) -> None:
 
 
 def counts(rows: Sequence[Row]) -> tuple[int, int]:
-    """Return the number of rows with a result and of failed rows."""
     right = sum(row["status"] == OK for row in rows)
     return right, len(rows) - right
 

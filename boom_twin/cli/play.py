@@ -69,7 +69,6 @@ def run(args: Namespace) -> int:
 
 
 def _play(player: Player, args: Namespace, length: float) -> None:
-    """Play once or for ever."""
     if not sys.stderr.isatty():
         tell(f"playing {length:.1f} s")
     while True:

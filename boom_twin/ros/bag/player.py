@@ -56,7 +56,6 @@ class Player:
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Names of the topics that are published."""
         return tuple(self._types)
 
     def unmatched(self, listeners: int = 1) -> list[str]:
@@ -120,7 +119,6 @@ class Player:
         ]
 
     def close(self) -> None:
-        """Destroy the player's node and publishers."""
         self._node.destroy_node()
 
     def _schedule(self, first: int, end: int, rate: float) -> Iterator[tuple[int, str, bytes | Clock]]:
@@ -136,5 +134,4 @@ class Player:
 
 
 def _clock_at(stamp: int) -> Clock:
-    """Return the message for ``/clock`` at a time, ns."""
     return Clock(clock=Time(sec=stamp // SECOND, nanosec=stamp % SECOND))

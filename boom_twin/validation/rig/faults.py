@@ -126,7 +126,6 @@ class RigFault:
 
     @property
     def is_there_at_first(self) -> bool:
-        """Return True if the fault is there in full from the start."""
         return self.onset == self.ramp == 0.0
 
     @property
@@ -136,17 +135,14 @@ class RigFault:
 
     @property
     def is_of_drive(self) -> bool:
-        """Return True if the drive moves by it, and the boom with the drive."""
         return self.cause.endswith(".drive")
 
     @property
     def is_constant(self) -> bool:
-        """Return True if the fault is there in full from the start to the end."""
         return self.is_there_at_first and self.end == math.inf
 
     @property
     def number(self) -> int:
-        """Return the i of its cause, from 1; 0 if it has none."""
         found = re.search(r"_(\d+)", self.cause)
         return 0 if found is None else int(found[1])
 

@@ -94,7 +94,6 @@ class Peer:
 
     @property
     def model(self) -> str:
-        """Return the model of the boom, in words."""
         return f"Exudyn, {self.elements} element{'s' if self.elements > 1 else ''}{', lumped' if self.lumped else ''}"
 
     @property
@@ -135,7 +134,6 @@ def load_rig() -> tuple[ModuleType | None, str]:
 
 
 def build() -> str:
-    """Return the loaded build of Exudyn in words."""
     return "without range checks" if "exudyn.exudynCPPfast" in sys.modules else "with range checks"
 
 
@@ -185,7 +183,6 @@ class Problem:
 
 
 def rms(vectors: Array) -> float:
-    """Return the root mean square length of `vectors`, shape (m, 2)."""
     return float(np.sqrt(np.mean(np.sum(np.square(vectors), axis=-1))))
 
 
@@ -202,7 +199,6 @@ def pose(scene: Scene, motion: Motion, quick: bool) -> Problem:
 
 
 def every(step: float) -> int:
-    """Return the number of steps between compared instants."""
     return round(ROW / step)
 
 
@@ -274,7 +270,6 @@ class Row:
 
     @property
     def acceleration(self) -> float:
-        """Return the larger of both errors."""
         return float(np.fmax(self.own_acceleration, self.independent_acceleration))
 
     @property
