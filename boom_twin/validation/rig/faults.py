@@ -98,10 +98,9 @@ class RigFault:
             raise UsageError(f"fault {self.cause}:{self.kind}:{self.size:g}: it has no size. Leave that out.")
         if bound is not None and not (math.isfinite(self.size) and _HOLDS[bound](self.size)):
             raise UsageError(f"fault {self.cause}:{self.kind}: size = {self.size:g}, must be {bound}. Give it in SI units.")
-        if not 0.0 <= self.onset < math.inf:
-            raise UsageError(f"fault {self}: onset = {self.onset:g} s, must be finite and at least 0.")
-        if not 0.0 <= self.ramp < math.inf:
-            raise UsageError(f"fault {self}: ramp = {self.ramp:g} s, must be finite and at least 0.")
+        for name, value in (("onset", self.onset), ("ramp", self.ramp)):
+            if not 0.0 <= value < math.inf:
+                raise UsageError(f"fault {self}: {name} = {value:g} s, must be finite and at least 0.")
         if not self.onset + self.ramp < self.end:
             whole = self.onset + self.ramp
             raise UsageError(f"fault {self}: end = {self.end:g} s, must be after {whole:g} s, when it is there in full.")
