@@ -1,7 +1,5 @@
 """Status of the twin and its inputs."""
 
-from __future__ import annotations
-
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence

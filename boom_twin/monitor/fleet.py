@@ -3,8 +3,6 @@
 The webhook does not delay the page.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import socket

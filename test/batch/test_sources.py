@@ -1,7 +1,5 @@
 """Which sessions are meant: paths, globs, lists."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

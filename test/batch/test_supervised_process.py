@@ -1,7 +1,5 @@
 """A process with limits: whatever it does, its caller goes on and knows why it failed."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """`boom_twin init`: from the example table, and what it refuses."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -3,8 +3,6 @@
 Run by ``make demo-live``; Ctrl-C ends it. The bundled session is synthetic (virtual rig, surrogate parameters).
 """
 
-from __future__ import annotations
-
 import re
 import signal
 import sys

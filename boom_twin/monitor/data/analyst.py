@@ -1,7 +1,5 @@
 """Analysis beside the server, of what is shown: spectrum, natural frequencies of the model, pump rates to avoid."""
 
-from __future__ import annotations
-
 import asyncio
 from dataclasses import asdict, dataclass
 from typing import Any

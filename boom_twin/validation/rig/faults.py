@@ -7,8 +7,6 @@ readings that are rounded already, as a fault behind the sensor does. Each begin
 its ramp, and goes over as long a time from its end on; a pin has its play from the start.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

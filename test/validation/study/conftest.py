@@ -1,7 +1,5 @@
 """Boom that is quick to study."""
 
-from __future__ import annotations
-
 import pytest
 from oracle import booms
 
