@@ -1,10 +1,9 @@
-"""Faults of the virtual rig: how they are written, the booms that have them, and what those of sensors do to readings.
+"""Faults of the virtual rig: their notation, the booms that have them, and the readings of faulty sensors.
 
-`listing` names every cause with its kinds and what their sizes are, in SI units. Those of stiffnesses, loads and clearance
-are physical: they are in the boom that is simulated (`changes`), whose parameters may be wrong at random, too (`wrong_by`). One
-of a drive is in the motion that the boom follows, and what has leaked by its end stays. The others are of sensors, and act on
-readings that are rounded already, as a fault behind the sensor does. Each begins at its onset, grows linearly to its size over
-its ramp, and goes over as long a time from its end on; a pin has its play from the start.
+`listing` names every cause with its kinds and sizes, in SI units. Faults of stiffness, load and clearance are physical:
+`changes` puts them into the simulated boom. A fault of a drive changes the motion that the boom follows; a leaked stroke stays.
+Faults of sensors change rounded readings. A fault begins at its onset, grows linearly to its size over its ramp, and falls
+from its end on over the same time. A pin has its play from the start.
 """
 
 import math
