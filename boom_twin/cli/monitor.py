@@ -28,9 +28,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--host", default="127.0.0.1", help="listen here (default 127.0.0.1); elsewhere viewers need a token")
     token = "file that holds the token, asked for on this machine too (default: a new token at each start)"
     parser.add_argument("--token-file", metavar="FILE", type=Path, help=token)
-    parser.add_argument(
-        "--webhook", metavar="URL", help="post a JSON object to URL when an alarm begins, changes its cause, or ends"
-    )
+    webhook = "post a JSON object to URL when an alarm begins, changes its cause, or ends"
+    parser.add_argument("--webhook", metavar="URL", help=webhook)
     allow = "actions that viewers may take: mark, acknowledge (default: both; without names: none)"
     parser.add_argument("--allow", nargs="*", choices=ACTS, default=ACTS, metavar="ACT", help=allow)
     parser.add_argument("--until-stdin-ends", action="store_true", help=SUPPRESS)  # it ends with the node that started it

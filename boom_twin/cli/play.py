@@ -27,17 +27,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--duration", type=positive, metavar="S", help="play S seconds (default: all)")
     parser.add_argument("--loop", action="store_true", help="repeat until Ctrl-C")
     parser.add_argument("--topics", nargs="+", metavar="NAME", help="topics to play (default: inputs of the twin)")
-    parser.add_argument(
-        "--clock",
-        nargs="?",
-        type=positive,
-        const=40.0,
-        metavar="HZ",
-        help="also publish the log times on /clock, HZ times a second (without a value 40)",
-    )
-    parser.add_argument(
-        "--wait", type=not_negative, default=10.0, metavar="S", help="wait S seconds for listeners (default 10; 0: do not)"
-    )
+    purpose = "also publish the log times on /clock, HZ times a second (without a value 40)"
+    parser.add_argument("--clock", nargs="?", type=positive, const=40.0, metavar="HZ", help=purpose)
+    purpose = "wait S seconds for listeners (default 10; 0: do not)"
+    parser.add_argument("--wait", type=not_negative, default=10.0, metavar="S", help=purpose)
     purpose = "listeners of every topic to wait for: 2 for node and recorder (default 1)"
     parser.add_argument("--listeners", type=int, choices=range(1, 100), default=1, metavar="N", help=purpose)
     add_ros_args(parser)

@@ -32,12 +32,8 @@ _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
 
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the session, new or empty")
-    parser.add_argument(
-        "--topics",
-        nargs="+",
-        metavar="NAME[:TYPE]",
-        help="record these topics instead; without TYPE, that of the first publisher",
-    )
+    purpose = "record these topics instead; without TYPE, that of the first publisher"
+    parser.add_argument("--topics", nargs="+", metavar="NAME[:TYPE]", help=purpose)
     parser.add_argument("--duration", type=positive, metavar="S", help="stop after S seconds (default: at Ctrl-C)")
     parser.add_argument("--split-size", type=size, metavar="BYTES", help="begin a new file at this size: 500M, 2G")
     parser.add_argument("--split-duration", type=long_enough, metavar="S", help="new file after S seconds")
