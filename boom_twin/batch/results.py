@@ -1,5 +1,7 @@
 """Page and summaries by rig of a batch: hours of work, fatigue damage and life, drift of figures over time."""
 
+from __future__ import annotations
+
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

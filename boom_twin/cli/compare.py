@@ -1,5 +1,7 @@
 """``boom_twin compare``: two sessions side by side."""
 
+from __future__ import annotations
+
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp

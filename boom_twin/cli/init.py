@@ -1,5 +1,7 @@
 """`boom_twin init`: a first scene from a table of the drawing's dimensions."""
 
+from __future__ import annotations
+
 import shlex
 import sys
 from argparse import ArgumentParser, Namespace

@@ -6,6 +6,8 @@ A command imports what it needs when it runs, so that help and usage errors are 
 Exit codes: 0 done, 1 the input or the run failed (the reason is on stderr), 2 usage.
 """
 
+from __future__ import annotations
+
 import gc
 import os
 import re

@@ -1,5 +1,7 @@
 """``boom_twin rig``: a synthetic session of the virtual rig, an independent model in Exudyn."""
 
+from __future__ import annotations
+
 from argparse import Action, ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,5 +1,7 @@
 """`boom_twin scene`: the default scene file, as it stands or with play in its pins, or an example."""
 
+from __future__ import annotations
+
 import sys
 from argparse import ArgumentParser, Namespace
 

@@ -1,5 +1,7 @@
 """``boom_twin study``: reports on the methods: error against run time, and others."""
 
+from __future__ import annotations
+
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from importlib import import_module

@@ -1,5 +1,7 @@
 """`boom_twin urdf`: a scene as a URDF, for robot_state_publisher."""
 
+from __future__ import annotations
+
 import sys
 from argparse import ArgumentParser, Namespace
 

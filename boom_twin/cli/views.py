@@ -1,5 +1,7 @@
 """`boom_twin views`: what RViz, Foxglove and PlotJuggler show, for a boom in a namespace."""
 
+from __future__ import annotations
+
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 

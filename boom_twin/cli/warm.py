@@ -1,5 +1,7 @@
 """``boom_twin warm``: compile the kernels beforehand, or remove what was compiled."""
 
+from __future__ import annotations
+
 import shutil
 import time
 from argparse import ArgumentParser, Namespace

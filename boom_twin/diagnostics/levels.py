@@ -1,5 +1,7 @@
 """Diagnostic levels: status of a component (REP-107) by several quantities, hysteresis, debounce time."""
 
+from __future__ import annotations
+
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,5 +1,7 @@
 """Statuses of the model: run time, normalised residuals, health alarms, tip load, stresses."""
 
+from __future__ import annotations
+
 from collections import Counter, deque
 from collections.abc import Mapping
 from math import nan

@@ -1,5 +1,7 @@
 """Statistics and status of the sensors of a stream: measuring, stuck or silent."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass

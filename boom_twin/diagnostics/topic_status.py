@@ -1,5 +1,7 @@
 """Statuses of the topics and of a recording: publishers, rates, ages, clocks, lost and waiting messages, disk."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan

@@ -1,5 +1,7 @@
 """Status of the twin and its inputs."""
 
+from __future__ import annotations
+
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence

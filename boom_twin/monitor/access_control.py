@@ -1,5 +1,7 @@
 """Access to the live page: checks of Host, Origin and token; answers to invalid requests; limit on lines of the log."""
 
+from __future__ import annotations
+
 import asyncio
 import hmac
 import logging

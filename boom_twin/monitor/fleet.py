@@ -1,5 +1,7 @@
 """Interfaces to other programs: metrics at ``/metrics`` for Prometheus, and a webhook that posts changes of alarms."""
 
+from __future__ import annotations
+
 import asyncio
 import logging
 import socket

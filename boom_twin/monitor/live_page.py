@@ -1,5 +1,7 @@
 """Live page of a twin that runs in this process, without ROS."""
 
+from __future__ import annotations
+
 import asyncio
 import time
 from collections import deque

@@ -17,6 +17,8 @@ A spectrum has two columns: the directions named by the message ``lines`` before
 ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``rates``, ``answer``.
 """
 
+from __future__ import annotations
+
 import struct
 from dataclasses import asdict
 from typing import Any

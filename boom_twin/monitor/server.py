@@ -1,5 +1,7 @@
 """HTTP and WebSocket server of the live page, and the context in which it listens."""
 
+from __future__ import annotations
+
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress

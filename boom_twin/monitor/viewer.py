@@ -4,6 +4,8 @@ No message is queued. The rows to send follow from the numbers of the rows alrea
 present state. A slow page loses rows, but no state of the lamps.
 """
 
+from __future__ import annotations
+
 import asyncio
 import json
 import time

@@ -1,5 +1,7 @@
 """Draw the pictures of replays, booms and studies from arrays. Only this package imports a plotting library, to draw."""
 
+from __future__ import annotations
+
 from .history import AlarmSpan, EstimateTrace, History, ImuTrace, ResidualTrace, Truth
 from .session import replay_pictures
 

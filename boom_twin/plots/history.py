@@ -1,5 +1,7 @@
 """Records that pictures are drawn from: frozen arrays, times in s since the first sample, model axes (x forward, y up)."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 

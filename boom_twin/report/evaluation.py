@@ -1,5 +1,7 @@
 """Evaluation of a replay while it runs: its history for pictures, its figures, what was measured while the boom stood still."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -9,6 +9,8 @@ Cycles are counted by the package `rainflow` (ASTM E1049), in a long session str
 added up. Turning points of open cycles are put before the next stretch, so the count is that of the whole session.
 """
 
+from __future__ import annotations
+
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass

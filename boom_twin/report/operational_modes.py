@@ -5,6 +5,8 @@ Stochastic subspace identification with covariances (B. Peeters and G. De Roeck,
 the next is stable. Stable poles of one frequency are a mode. Deviations follow from the covariance of the output covariances.
 """
 
+from __future__ import annotations
+
 import logging
 from contextlib import redirect_stderr
 from dataclasses import dataclass

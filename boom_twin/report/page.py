@@ -1,5 +1,7 @@
 """Pages of HTML from the folder ``templates``, each of one file: ``report.html``, the report of a session."""
 
+from __future__ import annotations
+
 from base64 import b64encode
 from datetime import UTC, datetime
 from math import isfinite

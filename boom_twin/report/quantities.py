@@ -1,5 +1,7 @@
 """Quantities of a session with standard deviations; two sessions compared by them; also bending moments and stresses."""
 
+from __future__ import annotations
+
 import json
 import math
 from collections.abc import Callable, Iterator

@@ -7,6 +7,8 @@ chi: Lankarani and Nikravesh (1990); Flores et al. (2011); Hunt and Crossley (19
 [R] is Ren et al. 2014, doi 10.1155/2014/943847. Vectors of the plane are complex numbers.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot, log1p, sqrt, tanh

@@ -1,5 +1,7 @@
 """A batch of small sessions: a broken one, a killed process, Ctrl-C, damaged rows, and going on."""
 
+from __future__ import annotations
+
 import json
 import os
 import re

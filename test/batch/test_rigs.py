@@ -1,5 +1,7 @@
 """Sessions summed up by rig: damage and life, drift of figures, what is not known."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,7 @@
 """Which sessions are meant: paths, globs, lists."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

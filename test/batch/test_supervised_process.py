@@ -1,5 +1,7 @@
 """A process with limits: whatever it does, its caller goes on and knows why it failed."""
 
+from __future__ import annotations
+
 import os
 import signal
 import subprocess

@@ -1,5 +1,7 @@
 """`boom_twin check`, `boom_twin scene`, and the exit codes of the console script."""
 
+from __future__ import annotations
+
 import json
 import subprocess
 import sys

@@ -1,5 +1,7 @@
 """`boom_twin init`: from the example table, and what it refuses."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

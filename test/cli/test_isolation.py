@@ -1,5 +1,7 @@
 """No module of the working directory, nor of a session's folder, runs in a child process."""
 
+from __future__ import annotations
+
 import json
 import os
 import shutil

@@ -1,5 +1,7 @@
 """What files and names hold is shown on the terminal, and never obeyed by it."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

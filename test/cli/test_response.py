@@ -1,5 +1,7 @@
 """``boom_twin response``: what it prints, writes and refuses."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """``boom_twin rig``: sessions of wrong and faulty booms, and that they can be replayed."""
 
+from __future__ import annotations
+
 import json
 import re
 from pathlib import Path

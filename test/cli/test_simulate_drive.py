@@ -1,5 +1,7 @@
 """What `simulate` reads, writes and says: drives likely meant otherwise, lengths, worn pins."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import numpy as np

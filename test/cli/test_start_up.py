@@ -1,5 +1,7 @@
 """Which modules a command imports: start-up time is made of that, and modules can be counted without a clock."""
 
+from __future__ import annotations
+
 import json
 import subprocess
 import sys

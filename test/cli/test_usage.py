@@ -1,5 +1,7 @@
 """The command line as its user meets it: nearest names, one option for the scene, help, quiet, completion, progress."""
 
+from __future__ import annotations
+
 from contextlib import closing
 from pathlib import Path
 

@@ -4,6 +4,8 @@ Three processes: ``twin_node``, ``boom_twin record``, and this one, which plays.
 session is synthetic (virtual rig, surrogate parameters).
 """
 
+from __future__ import annotations
+
 import sys
 import time
 from argparse import ArgumentParser, Namespace

@@ -3,6 +3,8 @@
 Run by ``make demo-live``; Ctrl-C ends it. The bundled session is synthetic (virtual rig, surrogate parameters).
 """
 
+from __future__ import annotations
+
 import re
 import signal
 import sys

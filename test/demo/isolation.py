@@ -9,6 +9,8 @@ Where Linux hands out its usual ports 32768 to 60999 to programs that ask for an
 ports of their own. The first are those that people use; so it is 215 to 232, and 102 to 214 once those are taken.
 """
 
+from __future__ import annotations
+
 import os
 import random
 import socket

@@ -1,5 +1,7 @@
 """Alarms of the rig's health on /diagnostics: told, kept after their end, let go when acknowledged."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

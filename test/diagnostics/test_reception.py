@@ -1,5 +1,7 @@
 """Levels of reception, of publishers, and of a recording."""
 
+from __future__ import annotations
+
 from math import inf
 from typing import Any
 

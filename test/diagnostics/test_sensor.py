@@ -1,5 +1,7 @@
 """Levels that must last, and what is told of one sensor."""
 
+from __future__ import annotations
+
 from math import inf, isnan, nan
 
 import numpy as np

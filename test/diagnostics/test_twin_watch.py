@@ -1,5 +1,7 @@
 """Model, topics and residuals, judged as the node has them judged."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any

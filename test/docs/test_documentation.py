@@ -1,5 +1,7 @@
 """The documentation tells the truth about the tree: links, paths, folders, commands, topics, figures, the stable names."""
 
+from __future__ import annotations
+
 import inspect
 import json
 import re

@@ -1,5 +1,7 @@
 """What the documentation and the examples tell to run runs as it stands, in a folder laid out as a clone is."""
 
+from __future__ import annotations
+
 import re
 import shutil
 import subprocess

@@ -1,5 +1,7 @@
 """The page of the first scene tells the truth: its commands print what it quotes."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

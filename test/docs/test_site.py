@@ -1,5 +1,7 @@
 """The site of the documentation: it builds without a warning, asks for nothing from elsewhere, and can be searched."""
 
+from __future__ import annotations
+
 import re
 import subprocess
 import sys

@@ -1,5 +1,7 @@
 """A session with faults in it, what a replay says of it, and the live page as a process."""
 
+from __future__ import annotations
+
 import re
 import signal
 import subprocess

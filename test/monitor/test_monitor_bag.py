@@ -1,5 +1,7 @@
 """The page is given of a session what a replay says of it."""
 
+from __future__ import annotations
+
 import json
 import shutil
 from pathlib import Path

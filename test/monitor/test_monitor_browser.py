@@ -1,5 +1,7 @@
 """The page in Debian's Chromium: its elements by their names, its numbers against those of the session."""
 
+from __future__ import annotations
+
 import csv
 import io
 import json

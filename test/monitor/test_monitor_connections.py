@@ -1,5 +1,7 @@
 """A real server process under odd connections and requests: an honest page gets in, and every answer has its headers."""
 
+from __future__ import annotations
+
 import asyncio
 import json
 import socket

@@ -1,5 +1,7 @@
 """What programs get of a monitor: figures at /metrics, and alarms by a webhook."""
 
+from __future__ import annotations
+
 import asyncio
 import json
 import socket

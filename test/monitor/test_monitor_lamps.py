@@ -1,5 +1,7 @@
 """Statuses as lamps: groups, severity, silence, the limit that is told; alarms from their begin to their end."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any

@@ -1,5 +1,7 @@
 """Malformed messages among good ones: dropped, counted with a reason, and the good ones are shown; in bounded memory."""
 
+from __future__ import annotations
+
 import asyncio
 import random
 import tracemalloc

@@ -1,5 +1,7 @@
 """Who comes in, what they get, what they may do, and what a hostile one is worth."""
 
+from __future__ import annotations
+
 import asyncio
 import json
 import struct

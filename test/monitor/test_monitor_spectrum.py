@@ -1,5 +1,7 @@
 """The spectrum of known signals: frequencies of sines and of a shaken oscillator."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from default_boom import strokes_of_posture

@@ -1,5 +1,7 @@
 """The guide tells the truth: its files load, its commands print what it quotes, its mistakes give its messages."""
 
+from __future__ import annotations
+
 import re
 import subprocess
 import sys

@@ -1,5 +1,7 @@
 """Pictures: pins and outlines where the geometry has them, the same bytes again, densities of SciPy, extreme rows kept."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Pictures of a replay: of the right size, not blank, the same for the same arrays, and robust."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 

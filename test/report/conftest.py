@@ -1,5 +1,7 @@
 """Two replays with everything: 24 s of the bundled session as they are, and with an encoder that is wrong from 12 s on."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import numpy as np

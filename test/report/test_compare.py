@@ -1,5 +1,7 @@
 """Two sessions side by side."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
 import pytest

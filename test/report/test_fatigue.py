@@ -1,5 +1,7 @@
 """Rainflow counts and damage against closed forms, and the report's part on fatigue."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 import rainflow

@@ -1,5 +1,7 @@
 """Frequencies and damping of rests and of a boom in wind."""
 
+from __future__ import annotations
+
 import json
 from dataclasses import replace
 from pathlib import Path

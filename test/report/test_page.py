@@ -1,5 +1,7 @@
 """The HTML report and its figures."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """Nodes in processes of their own, in a ROS domain of this test run."""
 
+from __future__ import annotations
+
 import os
 import signal
 import subprocess

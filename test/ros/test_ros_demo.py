@@ -1,5 +1,7 @@
 """The demonstration as processes of its own, which neither feed a rig on the same computer nor are fed by it."""
 
+from __future__ import annotations
+
 import os
 import re
 import signal

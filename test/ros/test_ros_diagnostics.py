@@ -1,5 +1,7 @@
 """What a node says of itself on /diagnostics while its inputs come, go and go wrong."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

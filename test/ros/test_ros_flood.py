@@ -1,5 +1,7 @@
 """A node that gets too much, or from two sources, or for long: it answers, tells so, and does not grow."""
 
+from __future__ import annotations
+
 import subprocess
 import sys
 from collections.abc import Callable, Iterator

@@ -4,6 +4,8 @@ launch and launch_ros are not on PyPI: the tests run where this Python has them,
 which this package must be installed too.
 """
 
+from __future__ import annotations
+
 import os
 import signal
 import subprocess

@@ -1,5 +1,7 @@
 """Launch files, RViz configuration, layouts: they name what is there. None of the programs that read them is on PyPI."""
 
+from __future__ import annotations
+
 import ast
 import json
 import re

@@ -1,5 +1,7 @@
 """Transitions, parameters, and how the node ends."""
 
+from __future__ import annotations
+
 import signal
 import time
 from collections.abc import Callable

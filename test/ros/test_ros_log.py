@@ -1,5 +1,7 @@
 """Words of others in the log and on /diagnostics, and the turns in which callbacks run."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable
 

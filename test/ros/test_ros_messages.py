@@ -1,5 +1,7 @@
 """A node that hears hostile and malformed messages among good ones: every good one is answered, and no other."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

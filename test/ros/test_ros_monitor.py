@@ -1,5 +1,7 @@
 """Alarms over DDS in the monitor's feed: from their topic, and let go of by the node."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace

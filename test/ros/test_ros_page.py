@@ -1,5 +1,7 @@
 """The live page that the node starts: it comes and goes with the node, and runs nothing of the folder."""
 
+from __future__ import annotations
+
 import os
 import re
 import signal

@@ -1,5 +1,7 @@
 """The whole chain: sensors at 200 Hz, node, monitor, and the page in Chromium; what it shows is what the topics say."""
 
+from __future__ import annotations
+
 import subprocess
 import sys
 import time

@@ -1,5 +1,7 @@
 """`boom_twin play` as a process, heard from here."""
 
+from __future__ import annotations
+
 import signal
 import time
 from collections.abc import Callable, Iterator

@@ -1,5 +1,7 @@
 """`boom_twin record` as a process, published to from here."""
 
+from __future__ import annotations
+
 import resource
 import signal
 import threading

@@ -1,5 +1,7 @@
 """A recorded live run: every reader reads the same values, and its replay gives what the node published, bit for bit."""
 
+from __future__ import annotations
+
 import dataclasses
 import json
 import math

@@ -1,5 +1,7 @@
 """What the node cannot start with is refused in one line, with its name and a remedy."""
 
+from __future__ import annotations
+
 import gc
 import os
 import signal

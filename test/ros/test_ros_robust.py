@@ -1,5 +1,7 @@
 """What happens around a node that runs: publishers come and go, clocks jump, somebody turns a knob. It says so once."""
 
+from __future__ import annotations
+
 import itertools
 import re
 from collections.abc import Callable

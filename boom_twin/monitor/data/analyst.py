@@ -1,5 +1,7 @@
 """Analysis of the shown data, in threads: spectrum, natural frequencies of the model, pump rates to avoid."""
 
+from __future__ import annotations
+
 import asyncio
 from dataclasses import asdict, dataclass
 from typing import Any

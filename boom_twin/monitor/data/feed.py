@@ -1,5 +1,7 @@
 """Feeds of the live page: live and recorded sources, and a viewer's place in a recording."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from ...analysis.drive import drives_as_read

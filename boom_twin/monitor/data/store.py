@@ -3,6 +3,8 @@
 Messages are checked before their numbers become rows. Those that cannot be used are dropped and counted by topic.
 """
 
+from __future__ import annotations
+
 import logging
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence

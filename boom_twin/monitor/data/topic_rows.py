@@ -3,6 +3,8 @@
 Nothing is known of who sent a message. Here, and nowhere after it, one that cannot be used is dropped and counted.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 from math import sqrt

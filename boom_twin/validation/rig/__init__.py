@@ -4,6 +4,8 @@ Nothing here is part of the twin, and nothing of the twin's equations is used he
 every session is synthetic. Needs the extra ``peers``: Exudyn is imported here alone.
 """
 
+from __future__ import annotations
+
 from importlib import import_module
 from typing import Any
 

@@ -9,6 +9,8 @@ Sources: J. Simo and L. Vu-Quoc, "On the dynamics of flexible beams under large 
 J. Appl. Mech. 53 (1986), for the beam; Exudyn (J. Gerstmayr) for everything that is solved.
 """
 
+from __future__ import annotations
+
 import math
 from itertools import pairwise
 from typing import Any

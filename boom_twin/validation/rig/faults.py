@@ -6,6 +6,8 @@ Faults of sensors change rounded readings. A fault begins at its onset, grows li
 from its end on over the same time. A pin has its play from the start.
 """
 
+from __future__ import annotations
+
 import math
 import re
 from collections.abc import Sequence

@@ -8,6 +8,8 @@ link is half its mass at either end. Everything is placed for the strokes at whi
 Of the default boom in the motion of the error study, all this is 0.08 mm of the tip and 0.4 % of its acceleration.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 

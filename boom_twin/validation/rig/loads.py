@@ -11,6 +11,8 @@ S(f) = 4 T s^2 / (1 + 70.8 (T f)^2)^(5/6), s the standard deviation, T the lengt
 The mean drag is left out.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

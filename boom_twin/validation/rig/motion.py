@@ -1,5 +1,7 @@
 """Drive programmes of the virtual rig: moves and holds, hand-made and random."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

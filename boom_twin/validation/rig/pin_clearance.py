@@ -4,6 +4,8 @@ The contact law is that of the peers, with the K of the scene's radii and materi
 has the twin linearise them.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any
 

@@ -4,6 +4,8 @@ Synthetic by construction: parameters of scene and sensors are surrogates, and n
 is the stamp itself.
 """
 
+from __future__ import annotations
+
 import gzip
 import math
 from collections.abc import Mapping, Sequence

@@ -5,6 +5,8 @@ pins carry much load, and not at all where such forces hold the boom up. Here th
 Exudyn's residual, which has everything.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

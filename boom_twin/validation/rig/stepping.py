@@ -4,6 +4,8 @@ A changed boom is built in full. At each step the moving boom has its own parame
 parameter except geometry can change, without a second formula.
 """
 
+from __future__ import annotations
+
 import contextlib
 import io
 import time

@@ -1,5 +1,7 @@
 """Study of error against run time (`boom_twin study error`): runs of all cases, their report and its picture."""
 
+from __future__ import annotations
+
 import math
 import statistics
 from collections.abc import Callable, Sequence

@@ -1,5 +1,7 @@
 """Study of parts: what each part of a model costs, and what leaving it out changes."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

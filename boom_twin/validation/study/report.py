@@ -1,5 +1,7 @@
 """Writer of a study's report: tables, files, machine and versions."""
 
+from __future__ import annotations
+
 import math
 import platform
 from collections.abc import Iterable, Mapping, Sequence

@@ -6,6 +6,8 @@ by the same angles in all. Six-bars of short sections are low, so their cylinder
 with the number of sections: the made-up material gets stiffer to match. The numbers describe no real machine.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

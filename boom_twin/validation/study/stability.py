@@ -1,5 +1,7 @@
 """Study of stability (`boom_twin study stability`): every case by every method, and the report."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
 import sys

@@ -1,5 +1,7 @@
 """Cases of the stability study: scenes, motions and steps, what is varied, what is right."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

@@ -1,5 +1,7 @@
 """Scenes for the tests of the virtual rig."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import pytest

@@ -1,5 +1,7 @@
 """The rig at rest and in motion against closed forms."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from default_boom import stroke_curve

@@ -1,5 +1,7 @@
 """Faults as they are written: what there is, what is refused and how it is told."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

@@ -1,5 +1,7 @@
 """Booms that are not those of their scene: physical faults, and parameters off at random."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Sensor faults: each does what it says, from its onset on, and nothing else."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from recordings import samples_in_rows

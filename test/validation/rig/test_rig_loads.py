@@ -1,5 +1,7 @@
 """Loads at the tip: how they are written, what they are over time, and that the boom bears them."""
 
+from __future__ import annotations
+
 import math
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Drive programmes: smooth, in range, slow enough."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 

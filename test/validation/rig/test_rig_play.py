@@ -1,5 +1,7 @@
 """The rig's simplifications: a rod pin with play against the twin, lumped masses against the reference."""
 
+from __future__ import annotations
+
 from functools import cache
 from pathlib import Path
 

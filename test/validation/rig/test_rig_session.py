@@ -1,5 +1,7 @@
 """Sessions of the rig: the sensors' statistics, common stamps, truth at the stamps, repeatable files."""
 
+from __future__ import annotations
+
 import gzip
 import math
 

@@ -1,5 +1,7 @@
 """Boom that is quick to study."""
 
+from __future__ import annotations
+
 import pytest
 from oracle import booms
 

@@ -1,5 +1,7 @@
 """Edits of scenes and of their text say the same, and leave everything else as it was."""
 
+from __future__ import annotations
+
 import difflib
 import io
 from pathlib import Path

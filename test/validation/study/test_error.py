@@ -1,5 +1,7 @@
 """The error report of the default scene: well-formed, consistent with itself, and honest about failures."""
 
+from __future__ import annotations
+
 import io
 import json
 from contextlib import redirect_stderr

@@ -1,5 +1,7 @@
 """What `check --need` proposes keeps its word, is final, and refuses nonsense."""
 
+from __future__ import annotations
+
 import json
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 """Cases of the stability study: their motions, the default method in the quick ones, the files."""
 
+from __future__ import annotations
+
 import pytest
 
 from boom_twin import load_scene

@@ -1,5 +1,7 @@
 """Studies of a scene's parts, their motions and their folders."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np
