@@ -17,8 +17,7 @@ from scipy.stats import t as student
 
 from ..plots.results import Trend, trends_picture
 from ..report.fatigue import LIVES, hours_as_text, hours_to_end, yearly_as_text
-from ..report.html import render
-from ..report.page import HOUR
+from ..report.page import HOUR, render
 from ..system.atomic_files import write_atomic
 from ..system.result_text import json_text
 from ..types import SECOND, sensor_kind
@@ -84,7 +83,6 @@ class RigSummary:
 
 
 def rigs_of(rows: Sequence[Row]) -> list[RigSummary]:
-    """Return a summary of each rig with a finished session, sorted by name."""
     return [_summary(rig, found) for rig, found in _finished_by_rig(rows)]
 
 
@@ -172,7 +170,6 @@ def write_rigs(path: Path, rigs: Sequence[RigSummary]) -> None:
 
 
 def counts(rows: Sequence[Row]) -> tuple[int, int]:
-    """Return the number of rows with a result and of failed rows."""
     right = sum(row["status"] == OK for row in rows)
     return right, len(rows) - right
 

@@ -84,7 +84,6 @@ def _namespace(text: str) -> str:
 
 
 def ros_arguments(args: Namespace) -> list[str]:
-    """Return the ROS arguments for rclpy, or for a further process of this package."""
     namespace = args.namespace.strip("/")
     return ["--ros-args", *(["-r", f"__ns:=/{namespace}"] if namespace else []), *args.ros_args]
 

@@ -114,7 +114,6 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
 
 
 def _kept(args: Namespace, folder: BatchFolder, task: SessionTask) -> Row | None:
-    """Return the row of an earlier call, unless it is to be tried again."""
     from ..batch.session_task import OK
 
     try:

@@ -34,13 +34,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--strict", action="store_true", help="treat warnings as errors: exit code 1 if there are any")
     add_file(parser, "--picture", "PNG file to draw: all pins, links and cylinders over the range of each joint")
     need.add_arguments(parser)
-    parser.add_argument(
-        "--sensors",
-        metavar="NAME,..",
-        help=f"also tell how accurate the estimate of the tip is with these and with fewer, at every posture of the scene: "
+    chosen = (
+        f"also tell how accurate the estimate of the tip is with these and with fewer, at every posture of the scene: "
         f"{', '.join(SENSORS)}; a name given twice is two such sensors; imu@{PLACE}, gyro@.., moment@.., point@..: elsewhere "
-        f"(example: angles,imu,imu@2:3.1)",
+        f"(example: angles,imu,imu@2:3.1)"
     )
+    parser.add_argument("--sensors", metavar="NAME,..", help=chosen)
     driven = "what the sensors are beside: strokes (the default), or angles on a boom without stroke transducers"
     parser.add_argument("--drive", choices=["strokes", "angles"], default="strokes", help=driven)
 

@@ -95,6 +95,9 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
     distro = values["distro"] or "distribution not noted"
     version = f"metadata version {values['metadata_version']}" if values["metadata_version"] else "no metadata.yaml"
     profile = f"; profile {values['profile']}" if values["profile"] else ""
+    part, whole = "", values["session_duration_s"]
+    if whole != values["duration_s"]:
+        part = f": the part from {info.window.start:g} s on, of {whole:.3f} s"
     lines = [
         f"session    {values['path']}",
         f"stored     {values['storage']}, {files}, {values['bytes'] / 2**20:.2f} MiB, compression {values['compression']}, "
@@ -104,7 +107,7 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
         f"scene      {values['scene']}, sha256 {values['scene_sha256'][:12]}.., {len(scene.scene.sections)} sections",
         f"mapping    {values['mapping']}",
         f"strokes    {StrokeReading(values['strokes']).text} ({values['strokes_source']})",
-        f"lasts      {values['duration_s']:.3f} s, {values['messages']} messages{_part_text(info, values)}",
+        f"lasts      {values['duration_s']:.3f} s, {values['messages']} messages{part}",
         "",
         *_table(info),
         "",
@@ -116,11 +119,6 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
     lines += [f"missing    {sentence}" for sentence in values["missing_for_replay"]]
     lines += [] if values["missing_for_replay"] else ["replay     nothing is missing"]
     return [printable(line, keep="") for line in lines]
-
-
-def _part_text(info: BagInfo, values: dict[str, Any]) -> str:
-    whole = values["session_duration_s"] == values["duration_s"]
-    return "" if whole else f": the part from {info.window.start:g} s on, of {values['session_duration_s']:.3f} s"
 
 
 def _table(info: BagInfo) -> list[str]:

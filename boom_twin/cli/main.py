@@ -210,7 +210,6 @@ def _parser(arguments: Sequence[str]) -> ArgumentParser:
 
 
 def _complete(parser: ArgumentParser) -> None:
-    """Answer the shell's question for what may follow, where argcomplete is installed, and end."""
     try:
         from argcomplete import autocomplete
     except ImportError:

@@ -15,9 +15,8 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("bag", metavar="BAG", help="session with rest of at least 20 s, better 2 minutes")
-    parser.add_argument(
-        "--out", required=True, metavar="DIR", help="folder for modes.json and stabilisation diagrams, new or empty"
-    )
+    place = "folder for modes.json and stabilisation diagrams, new or empty"
+    parser.add_argument("--out", required=True, metavar="DIR", help=place)
     add_session(parser)
     add_json(parser)
 

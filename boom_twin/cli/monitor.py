@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..errors import BoomTwinError, UsageError
 from ..monitor import ACTS, PORT
@@ -28,9 +28,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--host", default="127.0.0.1", help="listen here (default 127.0.0.1); elsewhere viewers need a token")
     token = "file that holds the token, asked for on this machine too (default: a new token at each start)"
     parser.add_argument("--token-file", metavar="FILE", type=Path, help=token)
-    parser.add_argument(
-        "--webhook", metavar="URL", help="post a JSON object to URL when an alarm begins, changes its cause, or ends"
-    )
+    webhook = "post a JSON object to URL when an alarm begins, changes its cause, or ends"
+    parser.add_argument("--webhook", metavar="URL", help=webhook)
     allow = "actions that viewers may take: mark, acknowledge (default: both; without names: none)"
     parser.add_argument("--allow", nargs="*", choices=ACTS, default=ACTS, metavar="ACT", help=allow)
     parser.add_argument("--until-stdin-ends", action="store_true", help=SUPPRESS)  # it ends with the node that started it
@@ -47,13 +46,14 @@ def run(args: Namespace) -> int:
     """Serve until Ctrl-C, SIGTERM or the end of the terminal."""
     if find_spec("aiohttp") is None:
         raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
+    import asyncio
+
     from ..monitor.access_control import write_log
-    from ..monitor.viewer import ViewerActions
 
     _lower_priority()
     write_log()
     with closing(_bag_feed(args)) if args.bag is not None else _live_feed(args) as feed:
-        _serve(args, feed, ViewerActions(feed, args.allow))
+        asyncio.run(_serve(args, feed))
     return 0
 
 
@@ -88,32 +88,26 @@ def _live_feed(args: Namespace) -> Iterator[Feed]:
             yield feed
 
 
-def _serve(args: Namespace, feed: Feed, actions: Any) -> None:
+async def _serve(args: Namespace, feed: Feed) -> None:
     import asyncio
 
     from ..monitor.access_control import AccessControl, token_of
     from ..monitor.fleet import Webhook
-    from ..monitor.server import Server
+    from ..monitor.server import Server, serving
+    from ..monitor.viewer import ViewerActions
+    from ..ros.startup import stop_signals
 
     access = AccessControl(args.host, "" if args.token_file is None else token_of(args.token_file))
     webhook = None if args.webhook is None else Webhook(args.webhook)
+    loop, stopped = asyncio.get_running_loop(), asyncio.Event()
+    for number in stop_signals():
+        loop.add_signal_handler(number, stopped.set)
+    if args.until_stdin_ends:
+        loop.add_reader(sys.stdin, stopped.set)
+    server = Server(feed, ViewerActions(feed, args.allow), access, webhook)
     try:
-        asyncio.run(_run(args, Server(feed, actions, access, webhook), access))
+        async with serving(server, access, args.host, args.port) as address:
+            tell(f"open {address}   (Ctrl-C ends it)")
+            await stopped.wait()
     except OSError as error:
         raise BoomTwinError(f"cannot listen on {args.host}:{args.port}: {error.strerror}. Choose another --port.") from None
-
-
-async def _run(args: Namespace, server: Any, access: Any) -> None:
-    import asyncio
-
-    from ..monitor.server import serving
-    from ..ros.startup import stop_signals
-
-    stopped = asyncio.Event()
-    for number in stop_signals():
-        asyncio.get_running_loop().add_signal_handler(number, stopped.set)
-    if args.until_stdin_ends:
-        asyncio.get_running_loop().add_reader(sys.stdin, stopped.set)
-    async with serving(server, access, args.host, args.port) as address:
-        tell(f"open {address}   (Ctrl-C ends it)")
-        await stopped.wait()

@@ -83,7 +83,6 @@ def open_session_settings(session: str | Path, params: Path | None, namespace: s
 
 
 def tell_oddities(oddities: Iterable[Fault], source: str | None) -> None:
-    """Print warnings and notes with their file on stderr."""
     for oddity in oddities:
         tell(f"{oddity.kind}: {source}: {oddity}")
 

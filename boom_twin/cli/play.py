@@ -1,15 +1,10 @@
-"""`boom_twin play`: publish a recorded session over ROS 2; keys of the terminal pause it."""
+"""`boom_twin play`: publish a recorded session over ROS 2."""
 
 from __future__ import annotations
 
-import os
-import select
 import sys
-import termios
-import tty
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,17 +27,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--duration", type=positive, metavar="S", help="play S seconds (default: all)")
     parser.add_argument("--loop", action="store_true", help="repeat until Ctrl-C")
     parser.add_argument("--topics", nargs="+", metavar="NAME", help="topics to play (default: inputs of the twin)")
-    parser.add_argument(
-        "--clock",
-        nargs="?",
-        type=positive,
-        const=40.0,
-        metavar="HZ",
-        help="also publish the log times on /clock, HZ times a second (without a value 40)",
-    )
-    parser.add_argument(
-        "--wait", type=not_negative, default=10.0, metavar="S", help="wait S seconds for listeners (default 10; 0: do not)"
-    )
+    purpose = "also publish the log times on /clock, HZ times a second (without a value 40)"
+    parser.add_argument("--clock", nargs="?", type=positive, const=40.0, metavar="HZ", help=purpose)
+    purpose = "wait S seconds for listeners (default 10; 0: do not)"
+    parser.add_argument("--wait", type=not_negative, default=10.0, metavar="S", help=purpose)
     purpose = "listeners of every topic to wait for: 2 for node and recorder (default 1)"
     parser.add_argument("--listeners", type=int, choices=range(1, 100), default=1, metavar="N", help=purpose)
     add_ros_args(parser)
@@ -74,34 +62,14 @@ def run(args: Namespace) -> int:
 
 
 def _play(player: Player, args: Namespace, length: float) -> None:
-    """Play once or for ever; the space bar of a terminal pauses."""
-    is_paused = False
-
-    def is_held() -> bool:
-        nonlocal is_paused
-        if pressed is not None and pressed().count(" ") % 2:
-            is_paused = not is_paused
-            show("paused" if is_paused else "playing")
-        return is_paused
-
-    def show(word: str) -> None:
-        if line.is_shown:
-            line.name = word
-            line.show()
-        else:
-            tell(f"{word}, {line.done:.1f} of {length:.1f} s")
-
-    with keys_of_terminal() as pressed:
-        if pressed is not None:
-            tell("space: pause and go on; Ctrl-C: end")
-        if not sys.stderr.isatty():
-            tell(f"playing {length:.1f} s")
-        while True:
-            with closing(ProgressLine(length, "s", "playing")) as line:
-                for elapsed in player.play(args.rate, args.start, args.duration, is_held):
-                    line.update(elapsed * NANO - line.done)
-            if not args.loop:
-                return
+    if not sys.stderr.isatty():
+        tell(f"playing {length:.1f} s")
+    while True:
+        with closing(ProgressLine(length, "s", "playing")) as line:
+            for elapsed in player.play(args.rate, args.start, args.duration):
+                line.update(elapsed * NANO - line.done)
+        if not args.loop:
+            return
 
 
 def _check_listeners(unmatched: list[str], unheard: list[str], topics: int, args: Namespace) -> None:
@@ -113,33 +81,3 @@ def _check_listeners(unmatched: list[str], unheard: list[str], topics: int, args
         )
     listeners = "nobody listens" if args.listeners == 1 else f"fewer than {args.listeners} listen"
     warn(f"{listeners} to {', '.join(unmatched)}")
-
-
-@contextmanager
-def keys_of_terminal() -> Iterator[Callable[[], str] | None]:
-    """Provide a function that returns the keys pressed since its last call; None if stdin is no terminal of this program."""
-    if not _is_ours():
-        yield None
-        return
-    before = termios.tcgetattr(sys.stdin)
-    tty.setcbreak(sys.stdin, termios.TCSADRAIN)
-    try:
-        yield _pressed
-    finally:
-        if _is_ours():
-            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
-
-
-def _pressed() -> str:
-    is_waiting = _is_ours() and select.select([sys.stdin], [], [], 0.0)[0]
-    return os.read(sys.stdin.fileno(), 100).decode(errors="replace") if is_waiting else ""
-
-
-def _is_ours() -> bool:
-    """Return True if stdin is a terminal and this process is in its foreground."""
-    try:
-        if not sys.stdin.isatty():
-            return False
-        return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
-    except (OSError, ValueError, AttributeError):  # no controlling terminal; stdin closed
-        return sys.stdin is not None and not sys.stdin.closed and sys.stdin.isatty()

@@ -24,7 +24,6 @@ from .arguments import add_ros_args, positive, ros_arguments
 from .output import tell, tell_oddities, warn
 
 if TYPE_CHECKING:
-    from ..diagnostics.topic_status import TopicCount
     from ..ros.bag.subscriptions import RequestedTopic
 
 
@@ -33,12 +32,8 @@ _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
 
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the session, new or empty")
-    parser.add_argument(
-        "--topics",
-        nargs="+",
-        metavar="NAME[:TYPE]",
-        help="record these topics instead; without TYPE, that of the first publisher",
-    )
+    purpose = "record these topics instead; without TYPE, that of the first publisher"
+    parser.add_argument("--topics", nargs="+", metavar="NAME[:TYPE]", help=purpose)
     parser.add_argument("--duration", type=positive, metavar="S", help="stop after S seconds (default: at Ctrl-C)")
     parser.add_argument("--split-size", type=size, metavar="BYTES", help="begin a new file at this size: 500M, 2G")
     parser.add_argument("--split-duration", type=long_enough, metavar="S", help="new file after S seconds")
@@ -92,7 +87,10 @@ def run(args: Namespace) -> int:
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
         recorder = Recorder(node, storage, wanted, thresholds, tell)
         counts = recorder.run(lambda: bool(signals) or time.monotonic() >= end, on_twin)
-    _tell_counts(counts)
+    tell(" received   written  never arrived")
+    for count in counts:
+        missed = "unknown" if count.missed is None else str(count.missed)
+        tell(f"{count.received:9d} {count.written:9d} {missed:>14}  {count.topic}")
     metadata.write(args.out, [asdict(count) for count in counts])
     if metadata.scene is None:
         tell("no scene is kept in session.yaml: none was given by --scene, and no twin told its own")
@@ -140,13 +138,6 @@ def _with_twin_values(metadata: SessionMetadata, answers: Mapping[str, Any], fra
     elif own not in (None, metadata.scene):
         warn("the running twin has another scene than --scene gives; session.yaml holds the one given")
     return replace(metadata, **changes)
-
-
-def _tell_counts(counts: list[TopicCount]) -> None:
-    tell(" received   written  never arrived")
-    for count in counts:
-        missed = "unknown" if count.missed is None else str(count.missed)
-        tell(f"{count.received:9d} {count.written:9d} {missed:>14}  {count.topic}")
 
 
 def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:

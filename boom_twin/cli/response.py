@@ -85,9 +85,14 @@ def run(args: Namespace) -> int:
     from ..system.result_folder import RESPONSE, result_folder
 
     scene = open_scene(args.scene)
-    _check_options(args)
+    is_map = args.map is not None
+    for option, is_given in (("--from", args.low != LOW), ("--to", args.high != HIGH)):
+        if is_given and (is_map or args.pump or args.load):
+            raise UsageError(f"{option}: goes with a frequency response, not with --pump, --load or --map. Leave it out.")
+    if args.rates != RATES and not is_map:
+        raise UsageError("--rates: goes with --map. Leave it out.")
     args.strokes = args.strokes if args.lengths is None else statics(scene, lengths=args.lengths).strokes
-    if args.map is not None:
+    if is_map:
         answer = _map(scene, args)
     elif args.pump or args.load:
         answer = _steady(scene, args)
@@ -104,15 +109,6 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _check_options(args: Namespace) -> None:
-    grid = {"--from": args.low != LOW, "--to": args.high != HIGH}
-    is_map = args.map is not None
-    for option in [name for name, is_given in grid.items() if is_given and (is_map or args.pump or args.load)]:
-        raise UsageError(f"{option}: goes with a frequency response, not with --pump, --load or --map. Leave it out.")
-    if args.rates != RATES and not is_map:
-        raise UsageError("--rates: goes with --map. Leave it out.")
-
-
 def _place(args: Namespace) -> str:
     return f"posture {args.posture}" if args.posture else "strokes " + ", ".join(f"{s:g}" for s in args.strokes) + " m"
 
@@ -124,6 +120,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     from ..plots.analysis import response_picture
 
     modes_sought = 40  # natural frequencies that are looked for within the band
+    beside, sharp = 1.0 + 1e-6, 3.0  # a peak `sharp` times as high as at `beside` times its frequency is not damped
 
     if not 0.0 < args.low < args.high < float("inf"):
         raise UsageError(f"--from {args.low:g} --to {args.high:g}: frequencies must be above 0 Hz and ascend. Give such.")
@@ -131,8 +128,8 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     natural = rest.frequencies[(rest.frequencies > args.low) & (rest.frequencies < args.high)]
     force = None if args.drive is not None else tuple(args.tip or UPWARD)
     place = args.strokes, args.posture, force, args.drive
-    at, beside = (frequency_response(scene, frequencies, *place).tip for frequencies in (natural, BESIDE * natural))
-    bounded = np.linalg.norm(at, axis=1) < SHARP * np.linalg.norm(beside, axis=1)
+    peak, flank = (frequency_response(scene, frequencies, *place).tip for frequencies in (natural, beside * natural))
+    bounded = np.linalg.norm(peak, axis=1) < sharp * np.linalg.norm(flank, axis=1)
     frequencies = np.unique(np.concatenate([np.geomspace(args.low, args.high, POINTS), natural[bounded]]))
     result = frequency_response(scene, frequencies, *place)
     static = frequency_response(scene, np.zeros(1), *place)
@@ -141,6 +138,11 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     else:
         load, unit = f"force at the tip ({force[0]:g}, {force[1]:g}) N", f"load of ({force[0]:g}, {force[1]:g}) N"
     title = f"Frequency response: {load}, {_place(args)}"
+    doubts = rest.doubts
+    if not bounded.all():
+        undamped = ", ".join(f"{frequency:.4f}" for frequency in natural[~bounded])
+        no_bound = "there the answer has no bound, and is left out. Give the scene beta and d"
+        doubts += (f"nothing damps the resonances at {undamped} Hz: {no_bound}",)
     channels = result.channels()
     values: dict[str, Any] = {"load": load, "frequency_Hz": frequencies, "natural_frequencies_Hz": natural}
     columns = {"frequency_Hz": frequencies}
@@ -152,20 +154,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
         [title, "", *_resonances(result, static, natural, bounded)],
         columns,
         lambda path: response_picture(path, title, unit, result, natural),
-        rest.doubts + _undamped(natural[~bounded]),
-    )
-
-
-BESIDE, SHARP = 1.0 + 1e-6, 3.0
-"""Times a natural frequency; a peak that is so much higher than there is bounded by rounding alone."""
-
-
-def _undamped(frequencies: Array) -> tuple[str, ...]:
-    if not len(frequencies):
-        return ()
-    told = ", ".join(f"{frequency:.4f}" for frequency in frequencies)
-    return (
-        f"nothing damps the resonances at {told} Hz: there the answer has no bound, and is left out. Give the scene beta and d",
+        doubts,
     )
 
 

@@ -12,7 +12,7 @@ from .output import open_scene
 
 # kind: (module in boom_twin.validation.study with write(scene, out, quick, posture) -> paths, what it does)
 KINDS: dict[str, tuple[str, str]] = {
-    "error": ("error", "compare error against run time of all methods and of Exudyn"),
+    "error": ("error", "compare error against run time of all methods and of Exudyn (extra peers)"),
     "stability": ("stability", "find where each method holds, degrades or fails on stiff and extreme cases"),
     "parts": ("parts", "measure the run time of every part of a model, and the effect of leaving it out"),
 }

@@ -11,9 +11,8 @@ from .arguments import add_namespace
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, required=True, help="folder for the three files; none is overwritten"
-    )
+    place = "folder for the three files; none is overwritten"
+    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help=place)
     add_namespace(parser, "ROS namespace of the twin")
     parser.add_argument("--frame-prefix", metavar="TEXT", default="", help="the node's parameter frame_prefix: front/")
 

@@ -55,11 +55,9 @@ class ModelWatch:
             self._failure, self.has_news = report.status, True
 
     def worked(self, duration: float) -> None:
-        """Add `duration` seconds of the twin's work outside its samples."""
         self._busy += duration
 
     def break_down(self, reason: str) -> None:
-        """Count a message that could not be handled."""
         self._broken += 1
         self._failure, self.has_news = reason, True
 

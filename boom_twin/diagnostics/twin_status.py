@@ -83,7 +83,6 @@ class TwinWatch:
         return "no alarm has ended: health was not judged" if self.health is None else self.health.acknowledge()
 
     def broken(self, reason: str) -> None:
-        """Count a message that could not be handled at all."""
         self._model.break_down(reason)
 
     # -- a look -------------------------------------------------------------------------------------------------------

@@ -5,21 +5,22 @@ ros2 launch boom_twin twin.launch.py state_publisher:=false monitor:=true       
 ros2 launch boom_twin twin.launch.py namespace:=front frame_prefix:=front/                   # one of several booms
 """
 
+import atexit
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, IncludeLaunchDescription, OpaqueFunction, Shutdown
-from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction, Shutdown
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from boom_twin.config.settings import DEFAULT_FILE, read_parameters
 from boom_twin.errors import BoomTwinError
 from boom_twin.messages.mapping import load_mapping
-from boom_twin.messages.urdf import RVIZ, urdf
+from boom_twin.messages.urdf import RVIZ, urdf, view_text
 from boom_twin.scene import Scene, load_scene
 from boom_twin.system.processes import python_command
 
@@ -69,7 +70,6 @@ def everything(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     if given["state_publisher"] == "true":
         found.append(state_publisher(given, values, scene))
     if given["rviz"] == "true":
-        Path(given["rviz_config"]).read_bytes()
         found.append(rviz(given, values))
     if given["record"]:
         found.append(recorder(given, values))
@@ -131,12 +131,20 @@ def state_publisher(given: Given, values: Values, scene: Scene) -> Node:
     )
 
 
-def rviz(given: Given, values: Values) -> IncludeLaunchDescription:
-    """Return RViz as ``rviz.launch.py`` starts it."""
-    source = PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/rviz.launch.py"])
-    own = {"frame_prefix": values["frame_prefix"], "use_sim_time": str(values["use_sim_time"]).lower()}
-    arguments = {name: given[name] for name in ("rviz_config", "namespace")} | own
-    return IncludeLaunchDescription(source, launch_arguments=list(arguments.items()))
+def rviz(given: Given, values: Values) -> Node:
+    """Return RViz in the twin's namespace, to which its topics are relative. A copy of its file has the frame prefix."""
+    folder = TemporaryDirectory(prefix="boom_twin_")
+    atexit.register(folder.cleanup)
+    config = Path(folder.name) / "boom_twin.rviz"
+    shown = Path(given["rviz_config"]).read_text(encoding="utf-8")
+    config.write_text(view_text(shown, given["namespace"], values["frame_prefix"]), encoding="utf-8")
+    return Node(
+        package="rviz2",
+        executable="rviz2",
+        namespace=given["namespace"],
+        arguments=["-d", str(config)],
+        parameters=[{"use_sim_time": values["use_sim_time"]}],
+    )
 
 
 def recorder(given: Given, values: Values) -> ExecuteProcess:

@@ -1,9 +1,4 @@
-"""Access to the live page: checks of Host, Origin and token; limits on connections and on lines of the log.
-
-A silent connection (no complete request yet) is closed after a timeout. If there are too many, a new one replaces the
-oldest. A page sends its request at once, so a thousand silent connections do not keep it out. Accepted connections are counted
-separately. Viewers' WebSockets are not counted here, see `boom_twin.monitor.server.MAX_VIEWERS`.
-"""
+"""Access to the live page: checks of Host, Origin and token; answers to invalid requests; limit on lines of the log."""
 
 from __future__ import annotations
 
@@ -106,71 +101,12 @@ class AccessControl:
         return hmac.compare_digest(token.encode(errors="replace"), self.token.encode())
 
 
-REQUEST_TIME = 5.0  # timeout (s) of a connection's first complete request, and of each further one
-LATE = f"it sent no request within {REQUEST_TIME:g} s"
-MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64  # largest number of silent or accepted connections: in total, and of one address
-
-
-class Connections:
-    """Connections to one server: silent ones, and those of which a request was accepted."""
-
-    def __init__(self) -> None:
-        self._all: dict[Connection, bool] = {}  # True if accepted; in order of last use
-
-    def count(self, connection: Connection, is_accepted: bool) -> None:
-        """Count a connection as the newest of its kind; cut off the oldest one if there are too many."""
-        self.end(connection)
-        kind = [each for each, accepted in self._all.items() if accepted is is_accepted]
-        same = [each for each in kind if each.address == connection.address]
-        if len(same) >= MAX_OF_ADDRESS or len(kind) >= MAX_CONNECTIONS:
-            self.cut_off(same[0] if len(same) >= MAX_OF_ADDRESS else kind[0], "a newer one")
-        self._all[connection] = is_accepted
-
-    def end(self, connection: Connection) -> None:
-        """Stop counting a connection that is closed or became a viewer's."""
-        self._all.pop(connection, None)
-
-    def cut_off(self, connection: Connection, reason: str) -> None:
-        """Close a connection without an answer."""
-        self.end(connection)
-        LOG.warning("cut off a connection of %s: %s", connection.address, reason)
-        connection.abort()
-
-
 class Connection(web.RequestHandler):
     """Connection whose requests aiohttp reads. Every answer has the headers of `POLICY`, even if the request is invalid."""
 
-    __slots__ = ("_all", "_deadline", "address")
-
-    def __init__(self, server: web.Server, everyone: Connections) -> None:
-        loop = asyncio.get_running_loop()
-        how: dict[str, Any] = {"keepalive_timeout": REQUEST_TIME, "lingering_time": 0.0, "auto_decompress": False}
-        super().__init__(server, loop=loop, access_log=None, **how)  # type: ignore[arg-type]
-        self._all, self.address = everyone, ""
-        self._deadline: asyncio.TimerHandle | None = None
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        super().connection_made(transport)
-        self.address = str((transport.get_extra_info("peername") or [""])[0])
-        self._deadline = asyncio.get_running_loop().call_later(REQUEST_TIME, self._all.cut_off, self, LATE)
-        self._all.count(self, is_accepted=False)
-
-    def connection_lost(self, exc: BaseException | None) -> None:
-        self._cancel_deadline()
-        self._all.end(self)
-        super().connection_lost(exc)
-
-    def accept(self) -> None:
-        self._cancel_deadline()
-        self._all.count(self, is_accepted=True)
-
-    def become_viewer(self) -> None:
-        self._all.end(self)
-
-    def abort(self) -> None:
-        self._cancel_deadline()
-        if self.transport is not None:
-            self.transport.abort()
+    def __init__(self, server: web.Server) -> None:
+        how: dict[str, Any] = {"keepalive_timeout": 5.0, "lingering_time": 0.0, "auto_decompress": False}  # s, s
+        super().__init__(server, loop=asyncio.get_running_loop(), access_log=None, **how)  # type: ignore[arg-type]
 
     def handle_error(
         self, request: web.BaseRequest, status: int = 500, exc: BaseException | None = None, message: str | None = None
@@ -183,18 +119,13 @@ class Connection(web.RequestHandler):
         if isinstance(exc, ConnectionError):
             return web.Response(status=status)
         if status == HTTPStatus.BAD_REQUEST:
-            LOG.warning("no request from %s: %s", self.address, printable(str(message)[:logged_length], keep=""))
+            LOG.warning("no request from %s: %s", request.remote, printable(str(message)[:logged_length], keep=""))
             response: web.StreamResponse = web.Response(status=status, text=message)
             response.force_close()
         else:
             response = super().handle_error(request, status, exc, message)
         response.headers.update(POLICY)
         return response
-
-    def _cancel_deadline(self) -> None:
-        if self._deadline is not None:
-            self._deadline.cancel()
-            self._deadline = None
 
 
 LOG_PERIOD = 10.0  # period (s) of the log's rate limit

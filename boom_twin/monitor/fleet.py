@@ -1,7 +1,4 @@
-"""What other programs get of a boom: figures at ``/metrics`` for Prometheus, and a webhook that posts changes of alarms.
-
-The webhook does not delay the page.
-"""
+"""Interfaces to other programs: metrics at ``/metrics`` for Prometheus, and a webhook that posts changes of alarms."""
 
 from __future__ import annotations
 

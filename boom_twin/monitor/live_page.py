@@ -47,7 +47,6 @@ class SourceFeed(Feed):
         return time.monotonic()
 
     def publish(self, words: str) -> None:
-        """Show an event at the newest sample."""
         self.store.alarms.add("event", Severity.OK, text(words), self.store.newest, self.store.newest)
 
 

@@ -91,7 +91,6 @@ def _residuals(table: str) -> dict[str, Any]:
 
 
 def alarms(found: list[ListedAlarm]) -> dict[str, Any]:
-    """Return the message ``alarms``, oldest first."""
     return {"kind": "alarms", "alarms": [{**asdict(alarm), "level": alarm.level.name} for alarm in found]}
 
 

@@ -13,7 +13,7 @@ from aiohttp import web
 
 from ..texts import FILE as TEXTS
 from . import PORT
-from .access_control import POLICY, AccessControl, Connection, Connections, in_address
+from .access_control import POLICY, AccessControl, Connection, in_address
 from .data.analyst import Analyst
 from .data.feed import Feed
 from .fleet import AlarmWatch, Metrics, Webhook
@@ -48,8 +48,6 @@ class Server:
     @web.middleware
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         self._access.check(request)
-        if isinstance(request.protocol, Connection):
-            request.protocol.accept()
         return await handler(request)
 
     async def _index(self, request: web.Request) -> web.FileResponse:
@@ -74,8 +72,6 @@ class Server:
         self._viewers.add(socket)
         try:
             await socket.prepare(request)
-            if isinstance(request.protocol, Connection):
-                request.protocol.become_viewer()
             await Viewer(socket, self._feed, self._actions, self._analyst).serve()
         finally:
             self._viewers.discard(socket)
@@ -134,7 +130,7 @@ async def serving(server: Server, access: AccessControl, host: str, port: int | 
     await runner.setup()
     assert runner.server is not None
     try:
-        listener = await _listen(partial(Connection, runner.server, Connections()), host, port)
+        listener = await _listen(partial(Connection, runner.server), host, port)
         number = listener.sockets[0].getsockname()[1]
         yield f"http://{in_address(host)}:{number}/" + (f"?token={access.token}" if access.token else "")
         listener.close()

@@ -11,7 +11,7 @@ import json
 import time
 from collections.abc import Collection
 from dataclasses import asdict
-from math import inf, isfinite
+from math import isfinite
 from typing import Any
 from unicodedata import category
 
@@ -156,8 +156,8 @@ class Viewer:
         first = self._sent.get(table.name)
         if first is None:
             first = table.until(position - HISTORY)
-        elif self._playback is None and (end - first > CHUNK or position - _time_of(table, first) > behind):
-            first = table.until(position - behind)
+        elif self._playback is None:
+            first = max(first, table.until(position - behind))
         if table.name == NEWEST_ROW_ONLY:
             first = max(first, end - 1)
         return max(first, table.first), end
@@ -223,8 +223,3 @@ class Viewer:
         {"seek": play.seek, "speed": play.pace, "hold": play.hold}[what](value)
         if play.position != before:
             self._generation = -1
-
-
-def _time_of(table: Table, row: int) -> float:
-    times = table.rows(row, row + 1)[0]
-    return float(times[0]) if len(times) else inf

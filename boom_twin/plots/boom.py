@@ -109,7 +109,6 @@ def joint_ranges_picture(path: Path, scene: Scene, name: str) -> Path:
 
 
 def _straight(scene: Scene) -> Array:
-    """Return the joint angles (rad) of the boom as straight as its ranges allow."""
     return np.asarray(np.radians(np.clip(0.0, *np.transpose([joint.range_deg for joint in scene.joints]))))
 
 

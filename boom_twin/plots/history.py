@@ -43,7 +43,6 @@ class EstimateTrace:
 
     @property
     def columns(self) -> tuple[Array, ...]:
-        """All arrays, in the order of the fields."""
         return tuple(getattr(self, each.name) for each in fields(self))
 
 
@@ -150,12 +149,10 @@ class ExtremeRows:
 
     @property
     def is_thin(self) -> bool:
-        """Return True if rows have been removed."""
         return self._width > 1
 
     @property
     def is_full(self) -> bool:
-        """Return True if rows must be removed."""
         return len(self._numbers) > self._most
 
     def thin(self, kept: NDArray[np.bool_]) -> None:

@@ -44,7 +44,6 @@ class SessionDistributionsBuilder:
 
     @property
     def distributions(self) -> SessionDistributions:
-        """Distributions and spectra of all parts so far."""
         residuals = {name: channel.distribution for name, channel in self._channels.items()}
         return SessionDistributions(residuals, tuple(self._predicted), tuple(self._measured) or None)
 
@@ -217,7 +216,6 @@ def _modes(axes: Axes, natural: Array) -> None:
 
 
 def has_spectrum(history: History) -> bool:
-    """Return True if the session is long enough for a spectrum."""
     shortest_spectrum = 4.0  # s; no spectrum of less
     return bool(len(history.stamps_s) > 16 and history.stamps_s[-1] - history.stamps_s[0] >= shortest_spectrum)
 

@@ -38,14 +38,14 @@ class Curve:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves on one pair of axes; `chosen` is the default, and below `floor` errors are not known."""
+    """Curves on one pair of axes; `chosen` is the default. Errors below `floor` are not known."""
 
     title: str
     label: str
     curves: Sequence[Curve]
     front: Curve  # fastest first
     chosen: tuple[float, float] | None  # seconds and error
-    floor: float | None
+    floor: float
 
 
 def error_picture(path: Path, note: str, panels: Sequence[Panel]) -> None:
@@ -92,8 +92,7 @@ def _marks(axes: Axes, panel: Panel) -> None:
     if panel.chosen:
         look: dict[str, Any] = {"color": PURPLE, "markeredgecolor": "white", "markersize": 20, "zorder": 7}
         axes.plot([1e3 * panel.chosen[0]], [panel.chosen[1]], "*", label="the default, step 1 ms", **look)
-    if panel.floor:
-        low, _ = axes.get_ylim()
-        less = "less than the references differ"
-        axes.axhspan(min(low, panel.floor), panel.floor, color=PALE, alpha=0.5, linewidth=0, zorder=0.5, label=less)
-        axes.set_ylim(bottom=low)
+    low, _ = axes.get_ylim()
+    less = "less than the references differ"
+    axes.axhspan(min(low, panel.floor), panel.floor, color=PALE, alpha=0.5, linewidth=0, zorder=0.5, label=less)
+    axes.set_ylim(bottom=low)

@@ -1,12 +1,16 @@
-"""Writer of ``report.html``: the report of a session in one file, from ``templates/report.html``."""
+"""Pages of HTML from the folder ``templates``, each of one file: ``report.html``, the report of a session."""
 
 from __future__ import annotations
 
+from base64 import b64encode
 from datetime import UTC, datetime
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 
 from .. import __version__
 from ..analysis.free_vibration import Vibration
@@ -22,7 +26,6 @@ from ..twin.blocks import event_meaning
 from ..types import SECOND, SENSORS, Stream
 from .evaluation import Evaluation
 from .fatigue import LIVES, NOISE_RANGE, hours_as_text, hours_to_end, yearly_as_text
-from .html import render
 from .quantities import Load
 from .vibration import MODE_DISTANCE, SHORTEST_REST
 
@@ -184,3 +187,24 @@ def _load(load: Load) -> tuple[object, ...]:
 def _stress(load: Load) -> str:
     deviation = "" if np.isnan(load.sigma) else f" ± {1e-6 * load.sigma / load.modulus:.2g}"
     return f"{1e-6 * load.stress:.3g}{deviation}"
+
+
+def render(template: str, **values: Any) -> str:
+    """Return the page that a template makes of `values`. Texts are escaped, except `Markup`."""
+    loader = FileSystemLoader(Path(__file__).parent / "templates")
+    environment = Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
+    environment.filters |= {"cell": _cell, "data": _data_address}
+    return environment.get_template(template).render(values)
+
+
+def _cell(value: object) -> Markup:
+    """Return the cell of a table: numbers right-aligned with 4 significant digits, None and NaN as a dash."""
+    if value is None or (isinstance(value, float) and not isfinite(value)):
+        return Markup('<td class="n">-</td>')
+    if isinstance(value, float | int):
+        return Markup('<td class="n">{}</td>').format(f"{value:.4g}" if isinstance(value, float) else value)
+    return Markup("<td>{}</td>").format(value)
+
+
+def _data_address(path: Path) -> str:
+    return f"data:image/png;base64,{b64encode(path.read_bytes()).decode()}"

@@ -102,7 +102,6 @@ class BatchMeans:
         self._sums: list[tuple[float, int]] = []  # sum and count of each piece; every part has `BATCHES` pieces
 
     def add(self, values: Array) -> None:
-        """Add values, shape (k,)."""
         self.count += len(values)
         self._sums += [(float(piece.sum()), len(piece)) for piece in np.array_split(values, BATCHES)]
 
@@ -155,7 +154,6 @@ def read(folder: Path) -> tuple[str, list[Quantity]]:
 
 
 def digest(scene: Scene) -> str:
-    """Return the hexadecimal SHA-256 of the scene's keys and values."""
     return sha256(scene.model_dump_json(exclude_none=True).encode()).hexdigest()
 
 

@@ -36,7 +36,6 @@ class Series(NamedTuple):
         return Series(np.concatenate([self.times, more.times]), np.concatenate([self.values, more.values]))
 
     def between(self, start: float, stop: float = inf) -> Series:
-        """Return the part from `start` (s) on, before `stop`."""
         inside = (self.times >= start) & (self.times < stop)
         return Series(self.times[inside], self.values[inside])
 

@@ -186,22 +186,14 @@ class ReceiveQueue:
     """Queue of messages of several topics, read in the order of their arrival.
 
     If a topic exceeds its `depth`, its oldest message is dropped. Other topics lose none.
-
-    Attributes
-    ----------
-    received : int
-        Queued messages of all topics.
-    oddities : Counter
-        Discarded messages of all topics: ``too large`` to be read in time, see `LARGEST`.
-    is_behind : bool
-        True if the newest message had waited in the executor, so that more may wait there.
     """
 
     def __init__(self) -> None:
         self._topics: dict[str, _Topic] = {}
         self._turns: deque[_Topic] = deque()  # topic of each message, by arrival; also of dropped ones
-        self.received, self.is_behind = 0, False
-        self.oddities: Counter[str] = Counter()
+        self.received = 0  # queued messages of all topics
+        self.is_behind = False  # the newest message had waited in the executor, so more may wait there
+        self.oddities: Counter[str] = Counter()  # discarded messages of all topics, larger than `LARGEST`
         self._on_put: Callable[[], None] | None = None
 
     def __bool__(self) -> bool:

@@ -98,12 +98,9 @@ class DemoProcesses:
 
     def play(self, player: Player, duration: float | None = None) -> Iterator[int]:
         """Play as `boom_twin.ros.bag.player.Player.play` does, as long as all processes run."""
-
-        def is_held() -> bool:
+        for elapsed in player.play(duration=duration):
             self.check()
-            return False
-
-        return player.play(duration=duration, is_held=is_held)
+            yield elapsed
 
     def wait_for_discovery(self, player: Player) -> None:
         """Wait until node, recorder and `player` have found each other; BoomTwinError if they do not."""
@@ -111,7 +108,7 @@ class DemoProcesses:
 
         print("starting the node; the first time it compiles for up to a minute ..", file=sys.stderr)
         end = time.monotonic() + PATIENCE
-        while player.wait(LOOK, LISTENERS, self.check) or COMPLETE not in self._recorder.output():
+        while player.wait(LOOK, LISTENERS) or COMPLETE not in self._recorder.output():
             self.check()
             if time.monotonic() > end:
                 raise BoomTwinError(f"node, recorder and player did not find each other within {PATIENCE:g} s.")

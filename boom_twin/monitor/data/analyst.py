@@ -1,4 +1,4 @@
-"""Analysis beside the server, of what is shown: spectrum, natural frequencies of the model, pump rates to avoid."""
+"""Analysis of the shown data, in threads: spectrum, natural frequencies of the model, pump rates to avoid."""
 
 from __future__ import annotations
 

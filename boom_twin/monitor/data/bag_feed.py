@@ -40,12 +40,10 @@ class BagFeed(Feed):
     _steps: Generator[None] | None = None
 
     def begin(self, steps: Generator[None]) -> None:
-        """Start reading; every step of `steps` reads a part of the session."""
         self._steps = steps
 
     @property
     def is_reading(self) -> bool:
-        """Return True if a part of the session is still to be read."""
         return self._steps is not None
 
     def poll(self) -> None:
@@ -112,7 +110,6 @@ def _title(session: Session, is_published: bool) -> str:
 def _take_published(
     session: Session, feed: Feed, topics: Topics, counts: dict[str, int], window: TimeWindow
 ) -> Generator[None]:
-    """Store the recorded outputs of the node and the measured acceleration, one message a step."""
     known, topic_rows = _names(topics), feed.topic_rows
     for name, _, message in read(session, {name: known[name].type for name in counts if name in topic_rows.names}, window):
         topic_rows.take(name, message, feed.now())

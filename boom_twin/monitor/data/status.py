@@ -93,7 +93,6 @@ class StatusTable:
 
 
 def worst(lamps: Iterable[StatusLamp]) -> StatusLamp | None:
-    """Return the lamp of the highest level, the first of equal ones."""
     return max(lamps, key=lambda lamp: lamp.level, default=None)
 
 

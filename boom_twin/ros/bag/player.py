@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import rclpy
@@ -22,7 +22,7 @@ from .subscriptions import installed_class
 
 CLOCK = "/clock"
 NAME = "boom_twin_player"
-LOOK = 0.05  # polling period (s) of listeners and pause
+LOOK = 0.05  # polling period (s) of listeners
 DELIVERY = 10.0  # timeout (s) for acknowledgements of reliable listeners at the end
 SETTLE = 0.5  # time (s) from the match with the last listener to the first message
 CATCH_UP = 4.0
@@ -33,26 +33,10 @@ Best-effort listeners would lose a burst: in shared memory Fast DDS holds 512 me
 
 
 class Player:
-    """Player of one session. It needs an initialised rclpy.
+    """Player of the topics `names` of one session, by default of the twin's inputs. It needs an initialised rclpy.
 
-    Parameters
-    ----------
-    names : sequence of str, optional
-        Topics, with the session's quality of service; by default the inputs of the twin.
-    clock_rate : float, optional
-        Rate (Hz) of log times on ``/clock``; None for none.
-
-    Attributes
-    ----------
-    wall, latest : float
-        Wall time (s); largest delay of a message (s).
-
-    Raises
-    ------
-    BagError
-        A topic is not in the session.
-    UsageError
-        The type of a topic is not installed.
+    Log times are on ``/clock`` at `clock_rate` (Hz); None: they are not. BagError if a topic is not in the session, UsageError
+    if its type is not installed.
     """
 
     def __init__(self, session: Session, names: Sequence[str] | None = None, clock_rate: float | None = None) -> None:
@@ -68,25 +52,23 @@ class Player:
         if clock_rate is not None:
             self._clock = self._node.create_publisher(Clock, CLOCK, 10)
         self.sent: Counter[str] = Counter()  # messages sent by topic, in all calls of `play` so far
-        self.latest = self.wall = self._ask = 0.0
+        self.latest = self.wall = 0.0  # largest delay of a message, wall time of all calls, s
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Names of the topics that are published."""
         return tuple(self._types)
 
     def unmatched(self, listeners: int = 1) -> list[str]:
         """Return the topics that fewer than `listeners` subscriptions have matched."""
         return [name for name, each in self._publishers.items() if each.get_subscription_count() < listeners]
 
-    def wait(self, timeout: float, listeners: int = 1, check: Callable[[], None] = lambda: None) -> list[str]:
-        """Wait until every topic has listeners, calling `check` repeatedly; return the topics without.
+    def wait(self, timeout: float, listeners: int = 1) -> list[str]:
+        """Wait until every topic has listeners; return the topics without.
 
         A short wait follows, because a publisher may discover a subscription a moment before the reverse.
         """
         end = time.monotonic() + timeout
         while (unmatched := self.unmatched(listeners)) and time.monotonic() < end:
-            check()
             time.sleep(LOOK)
         if timeout > 0.0:
             time.sleep(SETTLE)
@@ -99,42 +81,19 @@ class Player:
             raise BagError(f"{self._session.path}: nothing from {start:g} s on; the session lasts {whole:.1f} s.")
         return min(whole - start, whole if duration is None else duration)
 
-    def play(
-        self,
-        rate: float = 1.0,
-        start: float = 0.0,
-        duration: float | None = None,
-        is_held: Callable[[], bool] = lambda: False,
-    ) -> Iterator[int]:
-        """Publish one message per step of the iterator, and update the attributes.
+    def play(self, rate: float = 1.0, start: float = 0.0, duration: float | None = None) -> Iterator[int]:
+        """Publish a message at each step of the iterator, which yields the session time played (ns); update the attributes.
 
-        Parameters
-        ----------
-        rate : float
-            Session time over wall time, > 0.
-        start, duration : float
-            Part of the session, s; without a duration up to the end.
-        is_held : callable
-            Polled; while True, only the time on ``/clock`` is published.
-
-        Returns
-        -------
-        iterator of int
-            Session time played (ns) after every message.
-
-        Raises
-        ------
-        BagError
-            The session cannot be read.
+        `rate` is session time over wall time, `start` and `duration` (s) are the part. BagError if it cannot be read.
         """
         first = self._session.start + round(start / NANO)
         end = 2**64 if duration is None else first + round(duration / NANO)
-        entered = began = time.monotonic()
+        began = time.monotonic()
         sent, previous = began, 0.0
         try:
             for stamp, name, data in self._schedule(first, end, rate):
                 due = (stamp - first) * NANO / rate
-                began += self._wait(max(began + due, sent + (due - previous) / CATCH_UP), stamp, is_held)
+                time.sleep(max(0.0, max(began + due, sent + (due - previous) / CATCH_UP) - time.monotonic()))
                 sent, previous = time.monotonic(), due
                 self.latest = max(self.latest, sent - began - due)
                 if name == CLOCK and self._clock is not None:
@@ -144,29 +103,7 @@ class Player:
                     self.sent[name] += 1
                 yield stamp - first
         finally:
-            self.wall += time.monotonic() - entered
-
-    def _wait(self, due: float, stamp: int, is_held: Callable[[], bool]) -> float:
-        """Wait until `due`; return the duration (s) of pauses."""
-        held = 0.0
-        while True:
-            if time.monotonic() >= self._ask:
-                held += self._hold(stamp, is_held)
-                self._ask = time.monotonic() + LOOK
-            left = due + held - time.monotonic()
-            if left <= 0.0:
-                return held
-            time.sleep(min(left, LOOK))
-
-    def _hold(self, stamp: int, is_held: Callable[[], bool]) -> float:
-        """Wait while play is paused; return the duration (s)."""
-        began, was_held = time.monotonic(), False
-        while is_held():
-            was_held = True
-            if self._clock is not None:
-                self._clock.publish(_clock_at(stamp))
-            time.sleep(LOOK if self._clock_rate is None else min(LOOK, 1.0 / self._clock_rate))
-        return time.monotonic() - began if was_held else 0.0
+            self.wall += time.monotonic() - began
 
     def deliver(self, timeout: float = DELIVERY) -> list[str]:
         """Wait until all reliable listeners have received everything; return the topics not delivered.
@@ -182,7 +119,6 @@ class Player:
         ]
 
     def close(self) -> None:
-        """Destroy the player's node and publishers."""
         self._node.destroy_node()
 
     def _schedule(self, first: int, end: int, rate: float) -> Iterator[tuple[int, str, bytes | Clock]]:
@@ -198,5 +134,4 @@ class Player:
 
 
 def _clock_at(stamp: int) -> Clock:
-    """Return the message for ``/clock`` at a time, ns."""
     return Clock(clock=Time(sec=stamp // SECOND, nanosec=stamp % SECOND))

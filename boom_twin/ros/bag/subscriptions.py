@@ -57,7 +57,7 @@ def definition_of(kind: Any) -> str:
             texts[current], inner = _fields(message_class(current))
             waiting += inner
     first, *others = texts
-    return texts[first] + "".join(f"{_RULE}\nMSG: {_short(other)}\n{texts[other]}" for other in others)
+    return texts[first] + "".join(f"{_RULE}\nMSG: {other.replace('/msg/', '/')}\n{texts[other]}" for other in others)
 
 
 def _fields(kind: Any) -> tuple[str, list[str]]:
@@ -76,10 +76,6 @@ def _spelled(described: str) -> str:
     text = re.sub(r"^sequence<([^,]+)(?:, (\d+))?>$", lambda m: f"{m[1]}[{'<=' + m[2] if m[2] else ''}]", described)
     text = re.sub(r"^(w?string)<(\d+)>", r"\1<=\2", text)
     return re.sub(rf"^({'|'.join(_BASE)})\b", lambda m: _BASE[m[1]], text)
-
-
-def _short(name: str) -> str:
-    return name.replace("/msg/", "/")
 
 
 @dataclass(frozen=True, slots=True)

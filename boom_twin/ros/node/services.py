@@ -26,19 +26,8 @@ class Services:
     """Services of the node, all of type std_srvs/Trigger.
 
     ``~/reset``, ``~/acknowledge`` and by sensor ``~/rezero/joint_i``, ``cylinder_i``, ``cylinder_force_i``, ``tip_imu``.
-
-    ``~/scene`` answers with the text of the scene that the model was built from.
-
-    Parameters
-    ----------
-    twin : Twin
-        Takes what is asked for with its next full stroke sample.
-    acknowledge : callable
-        Lets go of alarms that ended; says which.
-    catch_up : callable
-        Lets the twin take what arrived before a request.
-    scene : str
-        Text of the scene that the model was built from.
+    ``~/scene`` answers with `scene`, the text from which the model was built. `acknowledge` releases ended alarms and returns
+    them in words. `catch_up` lets the twin take what arrived before a request.
     """
 
     def __init__(

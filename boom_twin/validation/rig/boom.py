@@ -19,7 +19,7 @@ import numpy as np
 
 from ...errors import UsageError
 from ...scene.kinematics import gravity_in_base
-from ...scene.schema import Cylinder, CylinderPart, Pin, RigidPart, Scene, Section
+from ...scene.schema import Cylinder, CylinderPart, Pin, RigidPart, Scene
 from ...types import Array
 from . import exudyn, items
 from .linkages import Link, lump_masses, six_bar
@@ -53,34 +53,20 @@ def _tip(scene: Scene, index: int) -> list[Lump]:
     return [Lump(scene.tip.payload, (scene.sections[index].length, 0.0), 0.0)]
 
 
-def _rigid_section(scene: Scene, index: int) -> list[Lump]:
-    section = scene.sections[index]
-    beam = [] if section.beam is None else [uniform_rod(*section.beam, section.rho_A or 0.0, section.rho_I or 0.0)]
-    fill = uniform_rod(0.0, section.length, scene.line_fill or 0.0)
-    return [*_part(section.root), *_part(section.head), *beam, fill, *_tip(scene, index)]
-
-
-def _root(scene: Scene, section: Section, start: float) -> list[Lump]:
-    """Return the lumps inboard of a beam that begins at `start` (m): root and concrete."""
-    return [*_part(section.root), uniform_rod(0.0, start, scene.line_fill or 0.0)]
-
-
-def _head(scene: Scene, index: int, end: float) -> list[Lump]:
-    """Return the lumps outboard of a beam that ends at `end` (m): head, concrete and payload."""
-    section = scene.sections[index]
-    return [*_part(section.head), uniform_rod(end, section.length, scene.line_fill or 0.0), *_tip(scene, index)]
-
-
 def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSection:
     """Add section `index` (0-based) of about `elements` finite elements. A rigid frame carries every cylinder pin."""
     borne = boom.lumps.sections[index] if boom.lumps else {}
+    section, concrete = boom.scene.sections[index], boom.scene.line_fill or 0.0
+    root, head, tip = _part(section.root), _part(section.head), _tip(boom.scene, index)
     if not boom.scene.is_flexible(index):
-        return BuiltSection(None, [_station(boom, frame, 0.0, _rigid_section(boom.scene, index), [*borne.values()])])
-    section = boom.scene.sections[index]
+        beam = [] if section.beam is None else [uniform_rod(*section.beam, section.rho_A or 0.0, section.rho_I or 0.0)]
+        whole = [*root, *head, *beam, uniform_rod(0.0, section.length, concrete), *tip]
+        return BuiltSection(None, [_station(boom, frame, 0.0, whole, [*borne.values()])])
     assert section.beam is not None
-    inside = _places_on_beam(boom, index)
-    places = [section.beam[0], *inside, section.beam[1]]
-    own = [_root(boom.scene, section, places[0]), *([] for _ in inside), _head(boom.scene, index, places[-1])]
+    inside, (low, high) = _places_on_beam(boom, index), section.beam
+    places = [low, *inside, high]
+    inboard, outboard = uniform_rod(0.0, low, concrete), uniform_rod(high, section.length, concrete)
+    own = [[*root, inboard], *([] for _ in inside), [*head, outboard, *tip]]
     near = {x: int(np.argmin([abs(x - place) for place in places])) for x in borne}
     stations = [
         _station(boom, frame, x, lumps, [borne[pin] for pin in borne if near[pin] == number])

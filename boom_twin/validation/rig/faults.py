@@ -1,10 +1,9 @@
-"""Faults of the virtual rig: how they are written, the booms that have them, and what those of sensors do to readings.
+"""Faults of the virtual rig: their notation, the booms that have them, and the readings of faulty sensors.
 
-`listing` names every cause with its kinds and what their sizes are, in SI units. Those of stiffnesses, loads and clearance
-are physical: they are in the boom that is simulated (`changes`), whose parameters may be wrong at random, too (`wrong_by`). One
-of a drive is in the motion that the boom follows, and what has leaked by its end stays. The others are of sensors, and act on
-readings that are rounded already, as a fault behind the sensor does. Each begins at its onset, grows linearly to its size over
-its ramp, and goes over as long a time from its end on; a pin has its play from the start.
+`listing` names every cause with its kinds and sizes, in SI units. Faults of stiffness, load and clearance are physical:
+`changes` puts them into the simulated boom. A fault of a drive changes the motion that the boom follows; a leaked stroke stays.
+Faults of sensors change rounded readings. A fault begins at its onset, grows linearly to its size over its ramp, and falls
+from its end on over the same time. A pin has its play from the start.
 """
 
 from __future__ import annotations
@@ -98,10 +97,9 @@ class RigFault:
             raise UsageError(f"fault {self.cause}:{self.kind}:{self.size:g}: it has no size. Leave that out.")
         if bound is not None and not (math.isfinite(self.size) and _HOLDS[bound](self.size)):
             raise UsageError(f"fault {self.cause}:{self.kind}: size = {self.size:g}, must be {bound}. Give it in SI units.")
-        if not 0.0 <= self.onset < math.inf:
-            raise UsageError(f"fault {self}: onset = {self.onset:g} s, must be finite and at least 0.")
-        if not 0.0 <= self.ramp < math.inf:
-            raise UsageError(f"fault {self}: ramp = {self.ramp:g} s, must be finite and at least 0.")
+        for name, value in (("onset", self.onset), ("ramp", self.ramp)):
+            if not 0.0 <= value < math.inf:
+                raise UsageError(f"fault {self}: {name} = {value:g} s, must be finite and at least 0.")
         if not self.onset + self.ramp < self.end:
             whole = self.onset + self.ramp
             raise UsageError(f"fault {self}: end = {self.end:g} s, must be after {whole:g} s, when it is there in full.")
@@ -126,7 +124,6 @@ class RigFault:
 
     @property
     def is_there_at_first(self) -> bool:
-        """Return True if the fault is there in full from the start."""
         return self.onset == self.ramp == 0.0
 
     @property
@@ -136,17 +133,14 @@ class RigFault:
 
     @property
     def is_of_drive(self) -> bool:
-        """Return True if the drive moves by it, and the boom with the drive."""
         return self.cause.endswith(".drive")
 
     @property
     def is_constant(self) -> bool:
-        """Return True if the fault is there in full from the start to the end."""
         return self.is_there_at_first and self.end == math.inf
 
     @property
     def number(self) -> int:
-        """Return the i of its cause, from 1; 0 if it has none."""
         found = re.search(r"_(\d+)", self.cause)
         return 0 if found is None else int(found[1])
 

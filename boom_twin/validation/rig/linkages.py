@@ -32,7 +32,6 @@ class Link:
 
     @property
     def lump(self) -> Lump:
-        """Return mass and moment of inertia of the link."""
         return Lump(self.mass, (0.0, 0.0), self.mass * self.length**2 / 12)
 
 
@@ -50,12 +49,10 @@ class SixBar:
 
     @property
     def bearing(self) -> Link:
-        """Return the link that bears the rod pin."""
         return self.right if self.bears_right else self.left
 
     @property
     def two_force(self) -> Link:
-        """Return the link without the rod pin."""
         return self.left if self.bears_right else self.right
 
 

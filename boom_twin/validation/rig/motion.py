@@ -19,7 +19,6 @@ from .system import section_frames
 
 
 def ease_rate(x: Array) -> Array:
-    """Return the derivative of `ease` by x."""
     x = np.clip(x, 0.0, 1.0)
     return np.asarray(30.0 * (x * (1.0 - x)) ** 2)
 
@@ -35,7 +34,6 @@ class Move:
 
     @property
     def end(self) -> float:
-        """Return the second at which the target is reached."""
         return self.start + self.duration
 
 

@@ -215,6 +215,5 @@ def _pressures(forces: Array, cylinders: Sequence[tuple[float, float]]) -> Array
 
 
 def site_of(scene: Scene, place: Place) -> Site:
-    """Return the site of a place on the boom."""
     section = len(scene.sections) if place.section is None else place.section
     return Site(section - 1, scene.sections[section - 1].length if place.at is None else place.at)

@@ -248,17 +248,15 @@ def move(
     count = _ratio("t_end", t_end, step)
     times: Array = step * np.arange(count + 1, dtype=np.float64)
     strokes, rates = drive(times)
-    others = [(_built_alike(resting.boom, changed, strokes[0]), share(times)) for changed, share in changes]
-    course = Course(strokes, rates, None if load is None else load(times), ParameterChanges(resting.boom, others))
-    effort = step_through(resting.boom, course, step, output_step, scheme or Scheme())
+    boom = resting.boom
+    alike = boom.elements, boom.nodally_exact, boom.lumps is not None, boom.shear_over_axial, boom.sites
+    others = [(build(changed, strokes[0], *alike), share(times)) for changed, share in changes]
+    course = Course(strokes, rates, None if load is None else load(times), ParameterChanges(boom, others))
+    effort = step_through(boom, course, step, output_step, scheme or Scheme())
     found = resting.probes.read(at_rest=False)
     found["forces"][0] = resting.rows["forces"][0]  # Exudyn starts with zero multipliers: incompressible cylinders read zero
     found["t"] = _recorded_times(found["t"], times[::every])
     return found | {"drives": drive(found["t"])[0]}, effort
-
-
-def _built_alike(boom: Boom, scene: Scene, strokes: Array) -> Boom:
-    return build(scene, strokes, boom.elements, boom.nodally_exact, boom.lumps is not None, boom.shear_over_axial, boom.sites)
 
 
 def settle(boom: Boom, strokes: Array) -> None:

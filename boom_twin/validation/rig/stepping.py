@@ -81,7 +81,6 @@ class ParameterChanges:
             _set(self._system, number, values, {name for more in self._more[number] for name in more})
 
     def restore(self) -> None:
-        """Restore the unchanged boom's parameters."""
         for number, old in self._healthy.items():
             _set(self._system, number, old, {name for more in self._more[number] for name in more})
 

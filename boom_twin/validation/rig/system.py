@@ -41,7 +41,6 @@ class Lumps:
     weight: list[Lump] = field(default_factory=list)
 
     def both(self, lump: Lump) -> None:
-        """Add a lump with inertia and weight."""
         self.inertia.append(lump)
         self.weight.append(lump)
 
@@ -55,7 +54,6 @@ class LumpedMasses:
 
     @classmethod
     def none(cls, count: int) -> LumpedMasses:
-        """Return lists without lumps for `count` sections."""
         return cls([{} for _ in range(count)], [Lumps() for _ in range(count)])
 
     def on_section(self, index: int, x: float) -> Lumps:
@@ -111,7 +109,6 @@ class BuiltSection:
 
     @property
     def root(self) -> Station:
-        """Return the rigid frame of the pivot."""
         return self.stations[0]
 
     @property
@@ -168,7 +165,6 @@ class Boom:
         return self.marker(self.base.body, (place[0] - self.base.origin[0], place[1] - self.base.origin[1]))
 
     def pin(self, one: int, other: int) -> None:
-        """Let two markers share their place."""
         self.system.AddObject(items.ObjectJointRevolute2D(markerNumbers=[one, other]))
 
     def loosen(self, bush: Bush) -> None:
@@ -179,11 +175,9 @@ class Boom:
         self.bushes.append(bush)
 
     def node(self, place: Array, angle: float) -> int:
-        """Add a node with three unknowns."""
         return int(self.system.AddNode(items.NodeRigidBody2D(referenceCoordinates=[*place, angle])))
 
     def rod(self, one: int, other: int, length: float) -> None:
-        """Let two markers keep their distance."""
         self.system.AddObject(items.ObjectConnectorDistance(markerNumbers=[one, other], distance=length))
 
     def body(self, node: int, mass: float, com: Point, inertia: float, weight: Gathered | None = None) -> int:
@@ -203,7 +197,6 @@ class Boom:
         self.system.SetLoadParameter(self.tip_load, "loadVector", [*load, 0.0])
 
     def weigh(self, body: int) -> None:
-        """Put gravity on a body or beam."""
         marker = self.system.AddMarker(items.MarkerBodyMass(bodyNumber=body))
         self.system.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=self.gravity))
 

@@ -77,22 +77,16 @@ def same_step(runner: Runner, rows: Sequence[Row], turns: int) -> dict[str, Any]
 
 def _draw(path: Path, problem: Problem, rows: Sequence[Row]) -> None:
     """Write errors of the tip and of its acceleration over run time; of each model of Exudyn, the front of its ways to step."""
-    apart = problem.apart or (None, None)
-    percent = None if apart[1] is None else 100.0 * apart[1]
+    tip, acceleration = problem.apart
+    label = "error of the tip's acceleration, % of its rms"
     panels = (
-        _panel("Tip", "error of the tip, mm rms", rows, TIP, apart[0]),
-        _panel(
-            "Tip acceleration",
-            "error of the tip's acceleration, % of its rms",
-            rows,
-            lambda row: 100.0 * row.acceleration,
-            percent,
-        ),
+        _panel("Tip", "error of the tip, mm rms", rows, TIP, tip),
+        _panel("Tip acceleration", label, rows, lambda row: 100.0 * row.acceleration, 100.0 * acceleration),
     )
     error_picture(path, "surrogate parameters; computed, not measured on a rig", panels)
 
 
-def _panel(title: str, label: str, rows: Sequence[Row], error: Measure, floor: float | None) -> Panel:
+def _panel(title: str, label: str, rows: Sequence[Row], error: Measure, floor: float) -> Panel:
     def points(chosen: Sequence[Row], kind: str, notes: Sequence[str] = ()) -> Curve:
         return Curve(kind, [row.seconds for row in chosen], [error(row) for row in chosen], notes)
 
@@ -113,7 +107,7 @@ def _panel(title: str, label: str, rows: Sequence[Row], error: Measure, floor: f
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
     """Run all cases on a motion of `scene` from `posture`; write error.json, error.md and error.png; return the paths."""
     problem = pose(scene, motion_of(scene, posture, 0.6 if quick else DURATION), quick)
-    cases: list[Case] = [*own_cases(scene, quick), *(peer_cases(quick) if problem.exudyn else ())]
+    cases: list[Case] = [*own_cases(scene, quick), *peer_cases(quick)]
     runner, rounds = Runner(problem), 1 if quick else 5  # a case runs in every round; its time is that of the fastest run
     bar = ProgressLine(rounds * len(cases), "cases", "study error")
     rows = runner.rows(cases, rounds, lambda: bar.update(1))
@@ -135,7 +129,7 @@ def report(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -
         _by_step(rows),
         "## At equal error of the tip",
         "Rows: the fastest case of each program within this error. Ratio: Exudyn's time over boom_twin's.",
-        _equal(problem, rows), _at_same_step(duel),
+        _equal(rows), _at_same_step(duel),
         f"## Methods at a step of {1e3 * Own().step:g} ms",
         "The first row is the default. Other rows name the difference. Other steps: `error.json`.",
         _methods(rows),
@@ -152,17 +146,11 @@ def report(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -
 
 def _setting(problem: Problem) -> str:
     own, other = problem.own, problem.exudyn
-    second = f"There is no independent reference: {problem.missing}"
-    if other is not None and problem.apart is not None:
-        apart = problem.apart
-        second = (
-            f"The independent one is {other.what} (remaining error: {_errors(other.tip_mm, other.acceleration)}). They "
-            f"differ by {_errors(*apart)}. A single error is the larger of both."
-        )
     return (
         f"Motion: {problem.motion.label}. Errors are rms over the motion. The error of acceleration is relative to the "
         f"acceleration's rms. The own reference is {own.what} (remaining error: {_errors(own.tip_mm, own.acceleration)}). "
-        f"{second}\n\n"
+        f"The independent one is {other.what} (remaining error: {_errors(other.tip_mm, other.acceleration)}). They "
+        f"differ by {_errors(*problem.apart)}. A single error is the larger of both.\n\n"
         "Run time is CPU time of compiled stepping on one core, in ms per simulated second (ms/s): the least of several runs, "
         "alternating with the other program."
     )
@@ -182,9 +170,7 @@ def _by_step(rows: Sequence[Row]) -> str:
     return table(head, lines)
 
 
-def _equal(problem: Problem, rows: Sequence[Row]) -> str:
-    if problem.exudyn is None:
-        return problem.missing
+def _equal(rows: Sequence[Row]) -> str:
     lines = []
     for most in EQUAL:
         own, peer = fastest(of(rows, Own), most), fastest(of(rows, Peer), most)
@@ -244,10 +230,8 @@ def _content(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None)
         "references": {
             reference.what: {"tip_mm": reference.tip_mm, "acceleration": reference.acceleration}
             for reference in (problem.own, problem.exudyn)
-            if reference is not None
         },
-        "references_differ": problem.apart and dict(zip(("tip_mm", "acceleration"), problem.apart, strict=True)),
-        "exudyn_missing": problem.missing or None,
+        "references_differ": dict(zip(("tip_mm", "acceleration"), problem.apart, strict=True)),
         "same_step": duel,
         "rows": [_flat(row) | {f"on_front_{name}": id(row) in chosen for name, chosen in fronts.items()} for row in rows],
     }

@@ -17,7 +17,6 @@ import numpy as np
 
 from ...analysis.methods import Method, Motion, integrate_with
 from ...compiler.compile import BasisName
-from ...errors import BoomTwinError
 from ...scene.schema import Scene
 from ...types import Array
 from .scenes import with_modes
@@ -94,7 +93,6 @@ class Peer:
 
     @property
     def model(self) -> str:
-        """Return the model of the boom, in words."""
         return f"Exudyn, {self.elements} element{'s' if self.elements > 1 else ''}{', lumped' if self.lumped else ''}"
 
     @property
@@ -123,19 +121,15 @@ def peer_cases(quick: bool) -> list[Peer]:
     return [Peer(step, n, kept, tolerance, lumps) for n, (kept, tolerance), step, lumps in (*lumped, *whole)]
 
 
-def load_rig() -> tuple[ModuleType | None, str]:
-    """Return `boom_twin.validation.rig`, or None and the reason. Prefer Exudyn's build without range checks."""
+def load_rig() -> ModuleType:
+    """Return `boom_twin.validation.rig`, with Exudyn's build without range checks; BoomTwinError without Exudyn."""
     if "exudyn" not in sys.modules:
         sys.exudynFast = True  # type: ignore[attr-defined]  # read by Exudyn
-    try:
-        with contextlib.redirect_stdout(io.StringIO()):
-            return import_module("boom_twin.validation.rig"), ""
-    except BoomTwinError as missing:
-        return None, str(missing)
+    with contextlib.redirect_stdout(io.StringIO()):
+        return import_module("boom_twin.validation.rig")
 
 
 def build() -> str:
-    """Return the loaded build of Exudyn in words."""
     return "without range checks" if "exudyn.exudynCPPfast" in sys.modules else "with range checks"
 
 
@@ -166,43 +160,30 @@ class Reference:
 
 @dataclass(frozen=True)
 class Problem:
-    """A scene in motion with its references. `exudyn` may be None; `missing` is the reason."""
+    """A scene in motion with its references: that of boom_twin and the independent one."""
 
     scene: Scene
     motion: Motion
     own: Reference
-    exudyn: Reference | None
-    missing: str
+    exudyn: Reference
 
     @property
-    def apart(self) -> tuple[float, float] | None:
+    def apart(self) -> tuple[float, float]:
         """Return the difference of the references: tip (mm), acceleration (relative)."""
-        return None if self.exudyn is None else self.own.path.away(self.exudyn.path)
-
-    def errors(self, path: TipPath) -> tuple[tuple[float, float], tuple[float, float] | None]:
-        """Return the errors of `path` against the own and the independent reference."""
-        return path.away(self.own.path), None if self.exudyn is None else path.away(self.exudyn.path)
+        return self.own.path.away(self.exudyn.path)
 
 
 def rms(vectors: Array) -> float:
-    """Return the root mean square length of `vectors`, shape (m, 2)."""
     return float(np.sqrt(np.mean(np.sum(np.square(vectors), axis=-1))))
 
 
 def pose(scene: Scene, motion: Motion, quick: bool) -> Problem:
     """Return the problem with its references. If `quick`, they have fewer elements and longer steps."""
-    rig, missing = load_rig()
-    independent = None
-    if rig is not None:
-        try:
-            independent = _independent(rig, scene, motion, quick)
-        except BoomTwinError as failure:
-            missing = str(failure)
-    return Problem(scene, motion, _own(scene, motion, quick), independent, missing)
+    independent = _independent(load_rig(), scene, motion, quick)
+    return Problem(scene, motion, _own(scene, motion, quick), independent)
 
 
 def every(step: float) -> int:
-    """Return the number of steps between compared instants."""
     return round(ROW / step)
 
 
@@ -274,7 +255,6 @@ class Row:
 
     @property
     def acceleration(self) -> float:
-        """Return the larger of both errors."""
         return float(np.fmax(self.own_acceleration, self.independent_acceleration))
 
     @property
@@ -318,8 +298,7 @@ class Runner:
         return self._row(case, path, found.seconds, found.steps, found.passes, found.status)
 
     def _exudyn(self, case: Peer) -> Row:
-        rig, _ = load_rig()
-        assert rig is not None  # or there would be no case of Exudyn
+        rig = load_rig()
         motion, boom = self.problem.motion, (case.elements, case.lumped)
         if boom not in self.resting:
             self.resting[boom] = at_rest(rig, self.problem.scene, motion.first, *boom)
@@ -332,7 +311,5 @@ class Runner:
         return self._row(case, TipPath(rows["tip"], rows["tip_acc"]), best.seconds, count, best.passes / count)
 
     def _row(self, case: Case, path: TipPath, seconds: float, steps: int, passes: float, status: str = "ok") -> Row:
-        own, independent = self.problem.errors(path)
-        return Row(
-            case, *own, *(independent or (math.nan, math.nan)), seconds / self.problem.motion.duration, steps, passes, status
-        )
+        own, independent = (path.away(reference.path) for reference in (self.problem.own, self.problem.exudyn))
+        return Row(case, *own, *independent, seconds / self.problem.motion.duration, steps, passes, status)

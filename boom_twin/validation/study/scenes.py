@@ -75,7 +75,6 @@ def loaded(scene: Scene, share: float) -> Scene:
 
 
 def undamped(scene: Scene) -> Scene:
-    """Return the scene without damping in beams and cylinders."""
     calm = _with_sections(scene, lambda section: section.model_copy(update={"beta": None}))
     return _with_cylinders(calm, lambda cylinder: cylinder.model_copy(update={"d": None}))
 

@@ -53,7 +53,6 @@ class DeadStop:
 
 
 def ease_integral(x: Array) -> Array:
-    """Return the integral of `ease` from 0, for x in [0, 1]."""
     return 2.5 * x**4 - 3.0 * x**5 + x**6
 
 
@@ -67,7 +66,6 @@ def smooth(
 
 
 def move_in_words(scene: Scene) -> str:
-    """Return the strokes of the study's move on a scene, in words."""
     travel = motion_of(scene).travel
     return "from rest, " + ", ".join(f"stroke {i + 1} by {1e3 * travel[i]:+.1f} mm" for i in np.flatnonzero(travel))
 

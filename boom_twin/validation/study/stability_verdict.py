@@ -66,7 +66,6 @@ class CaseVerdict:
 
     @property
     def mark(self) -> str:
-        """Return the word of the verdict, or "silent"."""
         return "silent" if self.silent else self.word
 
 
