@@ -317,9 +317,7 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
     """Solve for equilibrium under `load` times gravity from the present guess; return True if a stable one is found."""
     loaded = plan if load == 1.0 else replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
     scheme, still = prepare(REST, 0.0, 0.0, work.weights), np.zeros(plan.joints)
-    for cylinder in plan.tables.cylinders:  # reset angles of barrels and rods, to stay within half a turn after failed attempts
-        own = slice(cylinder.first_part, cylinder.first_part + cylinder.parts)
-        state.history[X, plan.tables.parts.history[own] + 2] = 0.0
+    state.history[X, plan.tables.parts.history + 2] = 0.0  # barrels and rods: within half a turn after failed attempts
     status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
     return bool(status == OK and is_stable(loaded, state, work))
 
