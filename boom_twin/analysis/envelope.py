@@ -88,6 +88,7 @@ class _Boom:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._plan = scene, compile_scene(scene)
+        self._state, self._work = self._plan.state(), self._plan.work()
         self._bending = moments_by_unknowns(self._plan)
         self._owners = np.array([station.section for station in stations(scene)], dtype=int)
         self._chain = np.array(scene.base.pivot), np.array([section.length for section in scene.sections])
@@ -97,12 +98,11 @@ class _Boom:
     def at_rest(self, relative: Array, modes: int = FREQUENCY_COUNT) -> Array | None:
         """Return section angles (deg), tip, deflection, forces, moments and frequencies in one row, None at no rest."""
         frequency_accuracy = 1e-5  # relative accuracy of frequencies
-        scene, plan = self._scene, self._plan
+        scene, plan, state, work = self._scene, self._plan, self._state, self._work
         strokes = strokes_of_angles(scene, relative)
         if not all(0.0 <= s <= joint.cylinder.max_stroke for s, joint in zip(strokes, scene.joints, strict=True)):
             self.skipped["out of a cylinder's travel"] += 1
             return None
-        state, work = plan.state(), plan.work()
         try:
             settle(plan, state, work, strokes, relative)
             found = natural_modes(plan, state, work, modes, frequency_accuracy) if modes else ()

@@ -18,7 +18,7 @@ from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
 from ..kernels.transfer.time_step import ANEW, advance
 from ..scene.edit import with_rigid_cylinders
-from ..scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_posture
+from ..scene.kinematics import joint_angles_of_strokes, plain, posture_angles, skeleton, strokes_of_posture
 from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
 from ..system.result_text import SummaryDisplay, numbers
@@ -79,10 +79,10 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
     """Set the state to the undeformed boom at joint `angles` (rad), shape (n,), with all forces zero."""
     state.z[:] = 0.0
     heading = 0.0
-    for i, angle in enumerate(angles):
-        z = plan.tables.joints[i].z
-        if plan.tables.linkages[i].length_l > 0.0:
-            left, right = link_angles(plan.tables.linkages[i], angle)
+    for linkage, z, angle in zip(plan.tables.linkages, plan.tables.joints.z.tolist(), angles, strict=True):
+        row = plain(linkage)
+        if row.length_l > 0.0:
+            left, right = link_angles(row, angle)
             state.z[z + Z_LINK_L], state.z[z + Z_LINK_R] = heading + left, heading + right
         heading += angle
         state.z[z + Z_SECTION] = heading
@@ -317,9 +317,7 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
     """Solve for equilibrium under `load` times gravity from the present guess; return True if a stable one is found."""
     loaded = plan if load == 1.0 else replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
     scheme, still = prepare(REST, 0.0, 0.0, work.weights), np.zeros(plan.joints)
-    for cylinder in plan.tables.cylinders:  # reset angles of barrels and rods, to stay within half a turn after failed attempts
-        own = slice(cylinder.first_part, cylinder.first_part + cylinder.parts)
-        state.history[X, plan.tables.parts.history[own] + 2] = 0.0
+    state.history[X, plan.tables.parts.history + 2] = 0.0  # barrels and rods: within half a turn after failed attempts
     status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
     return bool(status == OK and is_stable(loaded, state, work))
 

@@ -79,9 +79,11 @@ class Plan:
 
     def compliances_and_lags(self, drives: Array) -> tuple[Array, Array]:
         """Return 1/k (m/N; 0 if incompressible) and d/k (s) of cylinders whose `drives` are so long (m); all of shape (n,)."""
-        t = self.tables
-        found = [compliance_and_lag(row, t.oils, drive) for row, drive in zip(t.cylinders, drives, strict=True)]
-        return np.array([compliance for compliance, _ in found]), np.array([lag for _, lag in found])
+        cylinders, oils = self.tables.cylinders, self.tables.oils
+        compliances, lags = cylinders.compliance.copy(), cylinders.lag.copy()
+        for i in np.flatnonzero(cylinders.oil >= 0):
+            compliances[i], lags[i] = compliance_and_lag(cylinders[i], oils, drives[i])
+        return compliances, lags
 
     def state(self, depth: int = DEPTH) -> State:
         """A fresh state, all zero; `depth` rows of history."""

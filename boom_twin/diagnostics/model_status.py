@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Mapping
-from math import nan
-from typing import Generic, TypeVar
+from math import nan, sqrt
 
 import numpy as np
 
@@ -18,12 +17,11 @@ from ..predictions import Estimate, Prediction
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
 from .levels import Bounds, ComponentJudge, Level, Status, Value
+from .row_buffer import StampWindow
 
 FAILURE_SHOWN = 1.0  # time (s) for which a failure is shown
 LOAD_WINDOW = 40 * SECOND  # ns, window of loads at the tip
 SWING_WINDOW = 4 * SECOND  # ns, window of displacements of the tip: four periods of a slow boom
-INTERVAL = SECOND // 50  # ns, least time between two values of a window
-Item = TypeVar("Item")
 
 
 class ModelWatch:
@@ -118,35 +116,11 @@ class ModelWatch:
         self._looked, self._steps, self._busy, self._longest = now, 0, 0.0, 0.0
 
 
-class StampWindow(Generic[Item]):
-    """Items of the last `window` by their stamps, at most one in every `INTERVAL`."""
-
-    def __init__(self, window: int) -> None:
-        self._window = window
-        self._items: deque[tuple[int, Item]] = deque()
-
-    def is_due(self, stamp: int) -> bool:
-        """Return True if no item was added within the `INTERVAL` before `stamp` (ns)."""
-        return not self._items or not 0 <= stamp - self._items[-1][0] < INTERVAL
-
-    def add(self, stamp: int, item: Item) -> None:
-        """Add an item that `is_due`."""
-        if self._items and stamp < self._items[-1][0]:  # the clock was set back
-            self._items.clear()
-        self._items.append((stamp, item))
-        while stamp - self._items[0][0] > self._window:
-            self._items.popleft()
-
-    @property
-    def items(self) -> list[Item]:
-        return [item for _, item in self._items]
-
-
 class SwingWatch:
     """Displacements of the tip in the last `SWING_WINDOW`: estimated by all sensors, else predicted."""
 
     def __init__(self) -> None:
-        self._places = StampWindow[Array](SWING_WINDOW)
+        self._places = StampWindow(SWING_WINDOW, 2)
 
     def took(self, report: Report) -> None:
         p = report.prediction
@@ -157,7 +131,7 @@ class SwingWatch:
 
     def status(self, judge: ComponentJudge) -> Status:
         """Return the status with the swing: the largest distance of the tip from its mean, m."""
-        places, limits = np.array(self._places.items), judge.at.thresholds
+        places, limits = self._places.rows, judge.at.thresholds
         swing = float(np.linalg.norm(places - places.mean(axis=0), axis=1).max()) if len(places) else nan
         bounds = Bounds(limits.swing_warn, limits.swing_error)
         judge.check("swing_m", swing, bounds, "the tip swings too far: slow the pump down or stop the move", at_once=True)
@@ -169,18 +143,16 @@ class LoadWatch:
 
     def __init__(self) -> None:
         self.explanation = ""  # reason of residuals above noise; empty without a load at the last look
-        self._loads = StampWindow[Estimate](LOAD_WINDOW)
+        self._loads = StampWindow(LOAD_WINDOW, 4)  # forces and their variances
 
     def took(self, report: Report) -> None:
         if self._loads.is_due(report.stamp) and (estimate := report.estimate) is not None:
-            self._loads.add(report.stamp, estimate)
+            self._loads.add(report.stamp, np.concatenate([estimate.load, estimate.load_variance]))
 
     def status(self, judge: ComponentJudge) -> Status | None:
         """Return the status; None if only strokes are measured."""
-        finder, kept = TipLoadFinder(), self._loads.items
-        stamps = np.array([each.stamp for each in kept], np.int64)
-        loads, variances = (np.array([getattr(each, name) for each in kept]) for name in ("load", "load_variance"))
-        finder.add(stamps, loads.reshape(-1, 2), variances.reshape(-1, 2))
+        finder, rows = TipLoadFinder(), self._loads.rows
+        finder.add(self._loads.stamps, rows[:, :2], rows[:, 2:])
         load, self.explanation = finder.load, ""
         if load is None:
             return None
@@ -202,11 +174,13 @@ class ResidualWindow:
 
     def __init__(self, since: float) -> None:
         self._since = since
-        self._window: deque[tuple[float, Array]] = deque()
+        self._window: deque[tuple[float, int, float, float, float]] = deque()  # time, number, sum, sum of squares, largest
 
     def take(self, normalised: Array, now: float) -> None:
         """Take the normalised residuals since the last look, shape (k,); NaN where not measured."""
-        self._window.append((now, normalised[np.isfinite(normalised)]))
+        values = normalised[np.isfinite(normalised)]
+        largest = float(np.abs(values).max(initial=0.0))
+        self._window.append((now, len(values), float(values.sum()), float(values @ values), largest))
 
     def status(
         self, judge: ComponentJudge, alarm: tuple[Level, str] | None, explained: str = "", is_judged: bool = False
@@ -219,11 +193,10 @@ class ResidualWindow:
         thresholds, now = judge.at.thresholds, judge.at.now
         while self._window and self._window[0][0] <= now - thresholds.residual_window:
             self._window.popleft()
-        values = np.concatenate([np.zeros(0), *(each for _, each in self._window)])
-        count = len(values)
-        rms, mean, largest = nan, nan, nan
+        _, counts, sums, squares, peaks = zip(*self._window, strict=True) if self._window else ((),) * 5
+        count, rms, mean, largest = sum(counts), nan, nan, nan
         if count:
-            rms, mean, largest = float(np.sqrt(np.mean(values**2))), float(np.mean(values)), float(np.abs(values).max())
+            rms, mean, largest = sqrt(sum(squares) / count), sum(sums) / count, max(peaks)
         window = min(thresholds.residual_window, now - self._since)
         told = "larger than noise explains"
         told += "; health finds no fault in that" if is_judged and alarm is None else ""

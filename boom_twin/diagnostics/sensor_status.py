@@ -16,6 +16,7 @@ from ..scene.schema import Scene
 from ..texts import alarm_text
 from ..types import NANO, SENSORS, Array, Mount, Sample, Stream
 from .levels import Bounds, ComponentJudge, Status
+from .row_buffer import RowBuffer
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +87,7 @@ class StreamWatch:
         self._heard, self._looked_count, self._least, self.lag = self._monotonic(), self.count, nan, nan
         self._counted = nan, 0
         self._channels = [Channel(*bounds) for bounds in self._ranges]
-        self._stamps, self._values = list[int](), list[Array]()  # of samples
+        self._samples = RowBuffer(len(self._ranges))
 
     def seen(self, stamp: int) -> None:
         self.count += 1
@@ -98,8 +99,7 @@ class StreamWatch:
 
     def took(self, sample: Sample) -> None:
         """Take the sample of a message. A refused message has none."""
-        self._stamps.append(sample.stamp)
-        self._values.append(sample.values.copy())
+        self._samples.add(sample.stamp, sample.values)
 
     def age(self, now: float) -> float:
         """Return the time since the last message, or since listening began."""
@@ -121,8 +121,8 @@ class StreamWatch:
 
     def look(self, longest: float) -> list[ChannelStats]:
         """Return the statistics of every channel since the last look; `longest` (s) is the largest permitted step of stamps."""
-        stamps, table = np.array(self._stamps, np.int64), np.reshape(self._values, (-1, len(self._channels)))
-        self._stamps, self._values = [], []
+        stamps, table = self._samples.stamps, self._samples.rows
+        self._samples.forget(len(stamps))
         refused = max(0, self.count - self._looked_count - len(stamps))
         self._looked_count = self.count
         self.lag, self._least = self._least, nan

@@ -18,8 +18,8 @@ from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..system.child_call import ChildCall, ChildEndedError
 from ..system.processes import usable_cores
-from ..types import SECOND, Alarm, Array, Change, StrokeReading
-from .causes import Hypothesis
+from ..types import SECOND, Alarm, Change, StrokeReading
+from .causes import MEMORY, Hypothesis
 from .fault_search import DELAY, FaultSearch, Follower, Second
 from .sensor_check import Flags
 
@@ -30,7 +30,8 @@ class FaultTwins:
     """Samples of each second for a `FaultSearch`, and its alarms when they are due.
 
     `is_live`: the search runs in another process, in one thread, and the caller must not wait. On a busy processor verdicts
-    then come later than `DELAY`. Other parameters: see `FaultSearch`.
+    then come later than `DELAY`. While `MEMORY` seconds wait, further ones are left out: a pause in the samples to the twins.
+    Other parameters: see `FaultSearch`.
     """
 
     def __init__(
@@ -79,22 +80,21 @@ class FaultTwins:
         if not self._pending:
             self._second = second
 
-    def take(self, block: Any) -> None:
-        """Take samples of one second, in the order in which the twin takes them; keep those that `wants` accepts."""
-        streams, stamps, values = block.streams, block.stamps, block.values
-        keys, chosen = zip(streams.tolist(), map(_channels, np.isfinite(values)), strict=True), list[int]()
-        for row, (key, stamp) in enumerate(zip(keys, stamps.tolist(), strict=True)):
-            if self._is_spaced(key, stamp):
-                self._taken[key] = stamp
+    def take(self, block: Any, channels: bytes = b"") -> None:
+        """Take samples of one second, in the order in which the twin takes them; keep those that `wants` accepts.
+
+        `channels` is a key of those with a value in all these samples; empty if none is missing.
+        """
+        chosen = list[int]()
+        for row, (code, stamp) in enumerate(zip(block.streams.tolist(), block.stamps.tolist(), strict=True)):
+            if self.wants(code, stamp, channels):
+                self._taken[code, channels] = stamp
                 chosen.append(row)
-        self._pending.append(block._replace(streams=streams[chosen], stamps=stamps[chosen], values=values[chosen]))
+        self._pending.append(block._make(column[chosen] for column in block))
 
-    def wants(self, code: int, stamp: int, values: Array) -> bool:
+    def wants(self, code: int, stamp: int, channels: bytes = b"") -> bool:
         """Return True if a sample is at least `SPACING` after the last taken one of the same stream and channels."""
-        return self._is_spaced((code, _channels(np.isfinite(values))), stamp)
-
-    def _is_spaced(self, key: tuple[int, bytes], stamp: int) -> bool:
-        return not 0 <= stamp - self._taken.get(key, stamp - SPACING) < SPACING
+        return not 0 <= stamp - self._taken.get((code, channels), stamp - SPACING) < SPACING
 
     def change(self, change: Change) -> None:
         """Take a change before the samples that follow."""
@@ -103,10 +103,9 @@ class FaultTwins:
 
     def _close(self) -> None:
         """Hand the pending samples to the twins."""
-        if parts := [part for part in self._pending if len(part.stamps)]:
-            columns = zip(*((part.streams, part.stamps, part.values) for part in parts), strict=True)
-            streams, stamps, values = map(np.concatenate, columns)
-            block = parts[0]._replace(streams=streams, stamps=stamps, values=values)
+        parts = [part for part in self._pending if len(part.stamps)]
+        if parts and not (self._is_live and len(self._results) >= MEMORY):
+            block = parts[0]._make(map(np.concatenate, zip(*parts, strict=True)))
             self._hand_over(Second(self._second * SECOND, block, self._left_out))
         self._pending = []
 
@@ -139,8 +138,3 @@ class FaultTwins:
     def alarms(self) -> list[Alarm]:
         """Alarms that last."""
         return list(self._lasting.values())
-
-
-def _channels(has_value: Flags) -> bytes:
-    """Return a key of the channels of a sample that have a value. Channels that its stream lacks may follow."""
-    return has_value.tobytes().rstrip(b"\0")

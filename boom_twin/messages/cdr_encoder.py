@@ -126,8 +126,8 @@ class Template:
         rows[:] = self._blank
         body = rows[:, ORIGIN:]
         body.view("<f8")[:, self.double_places] = doubles
-        times = np.column_stack(np.divmod(stamps, SECOND))
-        body.view("<i4")[:, self._stamp_places] = times[:, self._stamp_parts]
+        times = np.array(np.divmod(stamps, SECOND))
+        body.view("<i4")[:, self._stamp_places] = times[self._stamp_parts].T
         if singles:
             body.view("<f4")[:, self._single_places] = singles
         return [rows[:, span] for span in self._spans]

@@ -134,10 +134,11 @@ def number_rows(chain: Chain, p: Prediction | PredictionBlock | None, e: Estimat
     at = JOINTS + 3 * joints
     numbers = np.full((count, at + len(TIP_JOINTS) + len(ESTIMATED_NUMBERS) + len(TURN)), math.nan)
     if p is not None:
-        tip = p.tip_position, p.tip_angle, p.tip_velocity, p.tip_angular_velocity
-        more = p.tip_acceleration, p.tip_angular_acceleration, p.tip_displacement
-        parts = (*tip, *more, p.joints, p.strokes, p.cylinder_forces)
-        numbers[:, :at] = np.concatenate([np.reshape(part, (count, -1)) for part in parts], axis=1)
+        numbers[:, :2], numbers[:, 2] = p.tip_position, p.tip_angle
+        numbers[:, 3:5], numbers[:, 5] = p.tip_velocity, p.tip_angular_velocity
+        numbers[:, 6:8], numbers[:, 8] = p.tip_acceleration, p.tip_angular_acceleration
+        numbers[:, 9:JOINTS], numbers[:, JOINTS : JOINTS + joints] = p.tip_displacement, p.joints
+        numbers[:, at - 2 * joints : at - joints], numbers[:, at - joints : at] = p.strokes, p.cylinder_forces
     if e is not None:
         rows = e.rows if isinstance(e, EstimateBlock) else row_of(e)[np.newaxis]
         numbers[:, at + 3 : -2] = rows[:, :FORCE_VARIANCE]

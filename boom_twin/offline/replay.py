@@ -24,6 +24,7 @@ from ..health.sensor_check import sensor_ranges
 from ..messages.sample_decoder import ODDITIES
 from ..scene.load import SceneSource
 from ..system.atomic_files import write_atomic
+from ..system.processes import quick_switches
 from ..system.result_folder import REPLAY, result_folder
 from ..system.result_text import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, CONSEQUENCES, EVENTS, SampleBlock
@@ -34,7 +35,7 @@ from .inputs import USUAL, ReplayInputs, ReplayOptions, replay_inputs
 from .progress import Progress
 from .recording import Recording, Stretch, alarm_as_text, clocks_of, summary_of
 from .sample_table import SampleTable, columns_of
-from .session_samples import SessionSamples, quick_switches, read_ahead, result_bag
+from .session_samples import SessionSamples, read_ahead, result_bag
 
 SESSION = "session"  # folder in a replay of a table, with the session that was made of it
 

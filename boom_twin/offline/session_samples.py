@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -166,17 +165,6 @@ def decoder_of(streams: list[Stream]) -> CdrDecoder:
 
 ITEMS_AHEAD = 8  # blocks of samples, or of reports, that wait between two threads
 Item = TypeVar("Item")
-
-
-@contextmanager
-def quick_switches() -> Iterator[None]:
-    """Shorten the switch interval of threads, so that the twin does not wait for the decoder of messages."""
-    usual = sys.getswitchinterval()
-    sys.setswitchinterval(2e-5)  # s that a thread keeps the interpreter's lock; a call of the twin's kernel takes 1 ms
-    try:
-        yield
-    finally:
-        sys.setswitchinterval(usual)
 
 
 def read_ahead(items: Iterable[Item]) -> Generator[Item]:

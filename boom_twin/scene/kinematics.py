@@ -57,7 +57,7 @@ def linkage_of(joint: JointGeometry, base: Base | None, first: Section | None) -
 def stroke_curve(scene: Scene, index: int, angles: Array) -> Array:
     """Return strokes (m) of joint `index` at relative `angles` (rad), shape as `angles`; NaN where the links do not close."""
     with np.errstate(invalid="ignore"):
-        lengths, _ = cylinder_length(_plain(linkage(scene, index)), np.atleast_1d(angles))
+        lengths, _ = cylinder_length(plain(linkage(scene, index)), np.atleast_1d(angles))
     return np.asarray(lengths - scene.joints[index].cylinder.closed_length)
 
 
@@ -71,7 +71,7 @@ class JointCurve(NamedTuple):
 
 def joint_curve(record: np.record, angles: Array) -> JointCurve:
     """Return the curve of a joint at `angles` (rad)."""
-    row = _plain(record)
+    row = plain(record)
     with np.errstate(invalid="ignore"):
         lengths, slopes = cylinder_length(row, angles)
         if row.mount == DIRECT:
@@ -181,7 +181,7 @@ class PassiveJoints:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._rows = [(joint.kind == "A", _plain(linkage(scene, i))) for i, joint in enumerate(scene.joints)]
+        self._rows = [(joint.kind == "A", plain(linkage(scene, i))) for i, joint in enumerate(scene.joints)]
         kinds = [(CYLINDER,) if joint.kind == "A" else (CYLINDER, LEFT, RIGHT) for joint in scene.joints]
         self.names = tuple(name.format(i) for i, own in enumerate(kinds, start=1) for name in own)
 
@@ -198,7 +198,7 @@ class PassiveJoints:
         return positions
 
 
-def _plain(row: np.record) -> SimpleNamespace:
+def plain(row: np.record) -> SimpleNamespace:
     """Return the fields of a record as Python numbers, which cost a tenth to read."""
     return SimpleNamespace(**dict(zip(LINKAGE.names or (), row.item(), strict=True)))
 
@@ -288,7 +288,7 @@ def joint_pins(scene: Scene, i: int, phi: Array) -> dict[str, Array]:
 
     The rod pin is ``Q`` in kind B1, ``R`` in the other six-bars, ``rod_pin`` in kind A. NaN where the links do not meet.
     """
-    row = _plain(linkage(scene, i))
+    row = plain(linkage(scene, i))
     e = np.asarray(_complex(turned(phi, row.ex, row.ey)))
     pins = {"the pivot": np.zeros_like(e), "C" if i else "cylinder_pin": np.full_like(e, complex(row.cx, row.cy))}
     if i == 0:

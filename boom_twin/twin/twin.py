@@ -209,7 +209,7 @@ class Twin(SampleTaker):
         if reason != DONE:
             return self._take_irregular(sample, reason).report(self.plan.joints)
         report = self._compiled.report(sample.stamp, judged)
-        if self._fault_twins is not None and self._fault_twins.wants(CODES[sample.stream], sample.stamp, sample.values):
+        if self._fault_twins is not None and self._fault_twins.wants(CODES[sample.stream], sample.stamp):
             self._fault_twins.take(block_of([sample], self.plan.joints))
         return report
 
@@ -244,7 +244,8 @@ class Twin(SampleTaker):
         if self._fault_twins is not None:
             if (change := rows.notes.get(len(rows.stamps) - 1, REGULAR).change) is not None:
                 self._fault_twins.change(change)
-            self._fault_twins.take(block_of([sample], self.plan.joints))
+            channels = b"" if self._is_complete(sample) else np.isfinite(sample.values).tobytes()
+            self._fault_twins.take(block_of([sample], self.plan.joints), channels)
         return rows
 
     @property

@@ -2,6 +2,7 @@
 
 import json
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ from command import main
 from default_boom import anew, parameter, with_parameters
 from health.recorded import session
 
-from boom_twin import Twin, load_scene
+from boom_twin import Settings, Twin, load_scene
+from boom_twin.health.causes import MEMORY
+from boom_twin.health.fault_twins import FaultTwins
 from boom_twin.twin.blocks import block_of
 from boom_twin.types import SECOND
 
@@ -98,6 +101,28 @@ def test_a_live_twin_goes_on_with_other_fault_twins_when_their_process_is_killed
         named |= {each.cause for each in health.alarms} if health else set()
     twin.close()
     assert "cylinder_2.k" in named
+
+
+def test_a_process_that_does_not_keep_up_is_given_a_minute_at_most():
+    """While the newest minute waits for the process, further seconds are left out: memory does not grow."""
+    free, taken, samples = threading.Event(), [], session(1.0)
+    twins = FaultTwins(load_scene(), None, Settings(), is_live=True)
+
+    def search(second):
+        free.wait(60.0)
+        taken.append(second.stamp)
+        return []
+
+    twins._search = search
+    for second in range(100):
+        for sample in samples:
+            stamp = sample.stamp % SECOND + second * SECOND
+            twins.reach(stamp, lambda: None)
+            twins.take(block_of([replace(sample, stamp=stamp)], 4))
+    free.set()
+    twins._worker.shutdown()
+    assert taken == [second * SECOND for second in range(MEMORY)]
+    assert twins.news(100 * SECOND) == [] and not twins._results
 
 
 def test_a_fault_twin_has_the_evidence_of_a_twin_without_its_reports():

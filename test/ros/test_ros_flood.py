@@ -5,8 +5,10 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
+from threading import Event
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,6 +16,8 @@ import pytest
 pytest.importorskip("rclpy")
 
 from ros_rig import Rig
+
+from boom_twin.ros.node.main import _live
 
 LIVE = Path(__file__).parents[1] / "bench" / "live.py"
 FEW = 60
@@ -30,6 +34,20 @@ def sources(*each: list[str]) -> Iterator[None]:
             stack.callback(process.kill)
             assert process.stdout is not None and "sending" in process.stdout.readline()
         yield
+
+
+def test_python_code_of_another_thread_is_interrupted_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While the node lives, no thread keeps the interpreter's lock for Python's usual 5 ms."""
+    found, usual = list[float](), sys.getswitchinterval()
+
+    def serve(_: Any) -> None:
+        found.append(sys.getswitchinterval())
+        node.finished = True
+
+    node: Any = SimpleNamespace(autostart=False, finished=False, failed=False, queue=SimpleNamespace(serve=serve))
+    monkeypatch.setattr("boom_twin.ros.receive.CallbackTurns", lambda *_: nullcontext())
+    assert _live(node, Event()) == 0
+    assert found[0] < 1e-4 < usual == sys.getswitchinterval()
 
 
 def test_a_flood(spawn_node: Callable[..., Any], new_rig: Callable[..., Rig], remote: Any) -> None:

@@ -13,7 +13,7 @@ from threading import Event
 from typing import TYPE_CHECKING
 
 from ...errors import BoomTwinError
-from ...system.processes import use_one_blas_thread
+from ...system.processes import quick_switches, use_one_blas_thread
 from ...system.terminal_text import open_closed_streams
 from ..startup import end_with_preparation, on_stop_signal, require_rclpy
 
@@ -73,7 +73,7 @@ def _live(node: TwinNode, stop: Event) -> int:
     try:
         if node.autostart and not node.start():
             return 1
-        with CallbackTurns(node, is_over) as turns:
+        with quick_switches(), CallbackTurns(node, is_over) as turns:
             while not is_over():
                 node.queue.serve(turns)
     except STOPPED:
