@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isnan, nan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..config.settings import Settings
-from ..health.sensor_check import readings_of_frozen, sensor_ranges
+from ..health.sensor_check import sensor_ranges
+from ..health.sensor_findings import readings_of_frozen
 from ..scene.schema import Scene
 from ..texts import alarm_text
 from ..types import NANO, SENSORS, Array, Mount, Sample, Stream
@@ -31,6 +32,7 @@ class ChannelStats:
     missing: float  # share of the messages without a finite value; NaN without messages
     outside: float  # share of the messages with a value out of range; NaN without messages
     unchanged: int  # consecutive readings, up to the newest, that repeat the one before
+    step: float  # smallest change between readings since listening began; before the first, the largest of other sensors
 
 
 class Channel:
@@ -38,7 +40,7 @@ class Channel:
 
     def __init__(self, low: float = -inf, high: float = inf) -> None:
         self._low, self._high = low, high
-        self._value, self._stamp, self._unchanged, self._gaps = nan, 0, 0, 0
+        self._value, self._stamp, self._unchanged, self._gaps, self._step = nan, 0, 0, 0, inf
 
     def look(self, stamps: NDArray[np.int64], values: Array, refused: int, longest: float) -> ChannelStats:
         """Return the statistics of `values` (k,) with `stamps` (k,) in ns; NaN where the message had no value.
@@ -51,7 +53,9 @@ class Channel:
         if len(values):
             steps = np.diff(stamps, prepend=self._stamp or stamps[0]) * NANO
             steps = steps[(steps > 0.0) & (steps <= longest_pause)]
-            changes = np.flatnonzero(np.diff(values, prepend=self._value) != 0.0)  # also the first reading ever
+            change = np.abs(np.diff(values, prepend=self._value))
+            self._step = min(self._step, change[change > 0.0].min(initial=inf))
+            changes = np.flatnonzero(change != 0.0)  # also the first reading ever
             self._unchanged = len(values) - 1 - int(changes[-1]) if len(changes) else self._unchanged + len(values)
             self._value, self._stamp = float(values[-1]), int(stamps[-1])
         outside = np.count_nonzero((values < self._low) | (values > self._high))
@@ -66,6 +70,7 @@ class Channel:
             missing=1.0 - len(values) / messages if messages else nan,
             outside=outside / messages if messages else nan,
             unchanged=self._unchanged,
+            step=self._step,
         )
 
 
@@ -126,7 +131,9 @@ class StreamWatch:
         refused = max(0, self.count - self._looked_count - len(stamps))
         self._looked_count = self.count
         self.lag, self._least = self._least, nan
-        return [channel.look(stamps, table[:, i], refused, longest) for i, channel in enumerate(self._channels)]
+        found = [channel.look(stamps, table[:, i], refused, longest) for i, channel in enumerate(self._channels)]
+        coarsest = max((each.step for each in found if each.step < inf), default=inf)
+        return [replace(each, step=min(each.step, coarsest)) for each in found]
 
 
 SLOW = 2.0  # largest step of stamps that is no gap at any rate, in sampling periods
@@ -195,7 +202,7 @@ def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats
     if sensor.high < inf:
         judge.note({f"low_{unit}": sensor.low, f"high_{unit}": sensor.high})
         judge.check("outside_share", stats.outside, share, alarm_text(sensor.name, "range", None))
-    needed = readings_of_frozen(sensor.sigma, sensor.resolution, thresholds.frozen_false_alarm)
+    needed = readings_of_frozen(sensor.sigma, max(sensor.resolution, stats.step), thresholds.frozen_false_alarm)
     stuck, unchanged = Bounds(error=max(thresholds.frozen_after, needed * period)), stats.unchanged * period
     judge.check("unchanged_s", unchanged, stuck, alarm_text(sensor.name, "stuck", None))
     return judge.finish("measuring" if stats.stamp else "waiting for a reading")

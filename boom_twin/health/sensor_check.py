@@ -13,41 +13,9 @@ from ..kernels.jit import SameTypes, hold
 from ..scene.schema import Scene
 from ..types import GIVE, Array, Mount, Stream, channels_of
 from .blocks import MeasuredRows
-from .sensor_findings import FALSE_ALARM, OUTSIDE, SILENT, SPIKES, STUCK, find
 from .sensor_findings import NOISY as IS_NOISY
+from .sensor_findings import OUTSIDE, SILENT, SPIKES, STUCK, find
 from .sensor_survey import BEFORE, LATELY, NOISY, NOISY_WINDOW, SILENT_FOR, CheckWork, SlowMeans, summarise, survey
-
-
-def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
-    """Return the number of equal readings in a row that white noise gives with a probability below `false_alarm`.
-
-    Noise of standard deviation s, read out in steps of q, repeats a reading with a probability of at most
-
-        p = erf(q / (2 sqrt(2) s)),
-
-    reached by a sensor that stands still in the middle of a step; N equal readings have p^(N - 1). A sensor that is coarse
-    against its noise needs many (q = 7 s: 4e4; q = 10 s: 4e7, for a probability of 1e-9); one without noise cannot be told
-    from a frozen one.
-
-    Parameters
-    ----------
-    sigma, resolution : float
-        Of the sensor, in its unit; the rule is as good as these. A sensor that is filtered repeats more often.
-    false_alarm : float
-        Probability for each reading.
-
-    Returns
-    -------
-    float
-        N >= 2; infinite without noise.
-    """
-    if sigma == 0.0:
-        return math.inf
-    missed = math.erfc(resolution / (2.0 * math.sqrt(2.0) * sigma))
-    if missed == 0.0:
-        return math.inf
-    return 2.0 if missed == 1.0 else max(2.0, 1.0 + math.ceil(math.log(false_alarm) / math.log1p(-missed)))
-
 
 Flags = NDArray[np.bool_]
 
@@ -56,7 +24,6 @@ NOISE_OVER = "noise_over_"  # and the name of a setting: how its figures are cal
 MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
 WINDOW = 2.0  # s, time constant of the slow means
 ENOUGH = 0.6  # weight of slow means that are judged: after 1.8 s
-REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to repeat
 
 
 def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, tuple[Array, Array]]:
@@ -125,7 +92,9 @@ class SensorCheck:
         self.slow, unknown = SlowMeans(*np.zeros((5, count))), np.full((4, count), np.nan)
         self._known = CheckWork(
             stated=stated2,
-            patience=int(np.clip(readings_of_frozen(sigma, resolution, FALSE_ALARM) - 1.0, *REPEATS)),
+            sigma=sigma,
+            steps=np.full(count, math.inf),
+            resolution=resolution,
             lately=np.array([(math.inf, stated2, stated2)], LATELY),
             low=low - margin,
             high=high + margin,

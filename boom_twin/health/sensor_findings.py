@@ -7,13 +7,14 @@ from statistics import NormalDist
 
 from ..kernels.jit import inner, kernel
 from .sensor_survey import BEFORE, SILENT_FOR, loud, noise2_at
+from .sensor_survey import NOISY as NOISY_OVER
 
 STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
 FALSE_ALARM = 1e-12  # probability, for each reading, of a finding in white noise
 OUTLIER = -math.sqrt(2.0) * NormalDist().inv_cdf(0.5 * FALSE_ALARM)  # difference of two readings, over their noise
 QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
 MISSING = 0.1  # share of the readings
-REPEATS_FOR = 0.4  # s, at least, of one reading again and again
+REPEATS_FOR, LEAST_REPEATS = 0.4, 3.0  # s; times, at least, that a reading has to repeat
 ENOUGH, MEDIAN2 = 6, 0.4549  # third differences whose median tells noise; that of the square of a standard normal value
 
 
@@ -47,8 +48,8 @@ def find(sensors, times, raw, left, largest, now, is_known, fastest, column, fla
         if largest > OUTLIER * math.sqrt(sensors.stated):
             least = OUTLIER * noise_of(sensors, times, left, i, column)
             is_spiky, jumped[i] = has_spikes(times, left, i, least), jump(times, raw, left, i, least, fastest)
-        flags[STUCK, i] = live and sensors.run[i] >= sensors.patience and newest - sensors.since[i] >= REPEATS_FOR
-        flags[NOISY, i] = is_known and power[i] > loud(sensors)
+        flags[STUCK, i] = live and newest - sensors.since[i] >= REPEATS_FOR and sensors.run[i] >= most_repeats(sensors, i)
+        flags[NOISY, i] = is_known and power[i] > max(loud(sensors), NOISY_OVER**2 * least_noise2(sensors, i))
         flags[SPIKES, i] = is_known and is_spiky
         flags[SILENT, i] = now - sensors.heard[i] > SILENT_FOR or sensors.missing[i] > MISSING
         flags[OUTSIDE, i] = sensors.outside[i] > 0.5 * (count - BEFORE)
@@ -56,6 +57,69 @@ def find(sensors, times, raw, left, largest, now, is_known, fastest, column, fla
         for kind in range(5):
             found = found or flags[kind, i]
     return found
+
+
+@inner
+def read_out(sensors, i):
+    """Return the step in which the sensor of channel i is read out; 0 where neither it nor another has shown one.
+
+    It is the resolution that is stated, or the smallest change that the sensor has shown, or, if it has shown none, the largest
+    of these of the other sensors.
+    """
+    shown = sensors.steps[i]
+    if math.isinf(shown):
+        shown = 0.0
+        for j in range(sensors.steps.shape[0]):
+            if math.isfinite(sensors.steps[j]):
+                shown = max(shown, sensors.steps[j])
+    return max(sensors.resolution, shown) if shown > 0.0 else 0.0
+
+
+@inner
+def least_noise2(sensors, i):
+    """Return the variance of the noise of channel i as stated, rounded as the sensor is read out."""
+    step = read_out(sensors, i)
+    return max(sensors.stated, sensors.sigma * sensors.sigma + step * step / 12.0)
+
+
+@inner
+def most_repeats(sensors, i):
+    """Return how often the sensor of channel i repeats a reading before it is stuck: a coarse one at rest for long."""
+    step = read_out(sensors, i)
+    needed = readings_of_frozen(sensors.sigma, step, FALSE_ALARM) - 1.0
+    return max(needed, LEAST_REPEATS) if step > 0.0 else math.inf
+
+
+@inner
+def readings_of_frozen(sigma, resolution, false_alarm):
+    """Return the number of equal readings in a row that white noise gives with a probability below `false_alarm`.
+
+    Noise of standard deviation s, `QUIET` of what is stated, repeats a reading in steps of q with a probability of at most
+
+        p = erf(q / (2 sqrt(2) s)),
+
+    reached by a sensor that stands still in the middle of a step; N equal readings have p^(N - 1). A sensor that is coarse
+    against its noise needs many (q = 7 s: 4e4; q = 10 s: 4e7, for a probability of 1e-9); one without noise cannot be told
+    from a frozen one.
+
+    Parameters
+    ----------
+    sigma, resolution : float
+        Of the sensor, in its unit: as stated; as stated or shown, whichever is coarser.
+    false_alarm : float
+        Probability for each reading.
+
+    Returns
+    -------
+    float
+        N >= 2; infinite without noise.
+    """
+    if sigma == 0.0:
+        return math.inf
+    missed = math.erfc(resolution / (2.0 * math.sqrt(2.0) * QUIET * sigma))
+    if missed == 0.0:
+        return math.inf
+    return 2.0 if missed == 1.0 else max(2.0, 1.0 + math.ceil(math.log(false_alarm) / math.log1p(-missed)))
 
 
 @inner
@@ -75,7 +139,7 @@ def noise_of(sensors, times, left, i, column):
     That median does not wait for the noise to be measured, as a mean over time does, and one spike leaves it as it is. A sensor
     that has twice the stated noise gives no spikes by that.
     """
-    variance, size = sensors.stated, 0
+    variance, size = least_noise2(sensors, i), 0
     if sensors.power[i] > variance:
         variance = sensors.power[i]
     for t in range(BEFORE, times.shape[0]):

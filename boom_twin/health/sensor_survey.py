@@ -46,7 +46,8 @@ BEFORE = 3  # readings before a block that `survey` and `find` take with it
 class CheckWork(NamedTuple):
     """State of `survey` and `summarise` for one stream.
 
-    stated : variance of the noise. patience : repetitions of a reading above which its sensor is stuck.
+    stated : variance of noise and rounding. sigma, resolution : standard deviation of the noise, step of the rounding.
+    steps : (channels,) smallest change from one reading to the next so far.
     lately : (1,) see `LATELY`.
     low, high : (channels,) the range of the sensors.
     heard : (channels,) time of the newest reading, s; NaN before the first.
@@ -56,7 +57,9 @@ class CheckWork(NamedTuple):
     """
 
     stated: float
-    patience: int
+    sigma: float
+    resolution: float
+    steps: Array
     lately: NDArray[np.void]
     low: Array
     high: Array
@@ -183,6 +186,8 @@ def go_on(sensors, times, raw, left, share):
                 run[i] += 1
             elif math.isfinite(raw[t, i]):
                 run[i], sensors.since[i] = 0, times[t]
+                if math.isfinite(raw[t - 1, i]):
+                    sensors.steps[i] = min(sensors.steps[i], abs(raw[t, i] - raw[t - 1, i]))
             if math.isfinite(raw[t, i]):
                 newest = t
         if newest >= 0:

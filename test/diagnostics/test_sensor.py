@@ -38,7 +38,7 @@ def test_figures_of_a_second() -> None:
 
 
 SENSOR = SensorSpec("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
-GOOD = ChannelStats(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0.0, outside=0.0, unchanged=1)
+GOOD = ChannelStats(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0.0, outside=0.0, unchanged=1, step=1e-6)
 OPTIONAL = SensorSpec("tip_imu_x", "m_s2", -inf, inf, 0.05, 0.0, False)
 STUCK, RANGE = (alarm_text("joint_1", kind, None) for kind in ("stuck", "range"))
 

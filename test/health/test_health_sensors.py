@@ -30,6 +30,11 @@ class Stream:
         self.block += 1
         return self.check.look(stamps[kept], raw[kept], expected[kept], self.block * ROWS * PERIOD)
 
+    def rounded(self, values):
+        """Readings of constant `values` (4,)."""
+        read = values + self.rng.normal(0.0, self.sigma, (ROWS, 4))
+        return np.round(read / self.resolution) * self.resolution
+
     def found(self, blocks: int, **options) -> dict[tuple[str, int], float]:
         """First time (s from now) of every kind and channel."""
         found: dict[tuple[str, int], float] = {}
@@ -66,6 +71,15 @@ RESTING = {"motion": lambda times: np.full_like(times, 0.3)}
 def test_clean_readings_give_nothing(made, blocks, looked):
     """10^5 readings of each of four channels in all."""
     assert Stream(**made).found(blocks, **looked) == {}
+
+
+@pytest.mark.parametrize(("sigma", "resolution"), [(SIGMA, 1.5e-3), (0.3 * SIGMA, 3.8e-4), (SIGMA, 6e-4)])
+def test_a_read_out_that_is_coarser_than_stated_gives_nothing(sigma, resolution):
+    """The boom rests for two minutes where some sensors dither between two steps and others stand in the middle of one."""
+    rests = np.full(4, 0.3) + resolution * np.array([0.0, 0.5, 0.2, -0.4])
+    stream = Stream(31, sigma=sigma, resolution=resolution)
+    stream.found(20)  # a move, in which all show their step
+    assert stream.found(1200, motion=lambda times: np.zeros_like(times), change=lambda _, raw: stream.rounded(rests)) == {}
 
 
 def test_stuck():
