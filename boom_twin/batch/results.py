@@ -19,7 +19,7 @@ from ..report.page import HOUR, render
 from ..system.atomic_files import write_atomic
 from ..system.result_text import json_text
 from ..types import SECOND, sensor_kind
-from .folder import SESSIONS
+from .folder import PAGE, RIGS, SESSIONS
 from .session_task import OK, Row
 
 DAY = 86400.0  # s
@@ -129,10 +129,6 @@ def _is_number(value: object) -> bool:
     return isinstance(value, float | int) and isfinite(value)
 
 
-def write_rigs(path: Path, rigs: Sequence[Row]) -> None:
-    write_atomic(path, json_text({"rigs": rigs}, indent=1) + "\n")
-
-
 def counts(rows: Sequence[Row]) -> tuple[int, int]:
     right = sum(row["status"] == OK for row in rows)
     return right, len(rows) - right
@@ -146,11 +142,12 @@ TRENDS = ("residual_rms_", "frequency_ratio_mode_", "damping_mode_", "calibrated
 """First part of the names of figures that are drawn over time."""
 
 
-def write_page(path: Path, rows: Sequence[Row], rigs: Sequence[Row]) -> None:
-    """Write the page beside the folder of the replays. The page loads nothing from other files."""
-    right, wrong = counts(rows)
+def write_summaries(folder: Path, rows: Sequence[Row]) -> None:
+    """Write ``rigs.json`` and the page beside the folder of the replays. The page loads nothing from other files."""
+    rigs, (right, wrong) = rigs_of(rows), counts(rows)
+    write_atomic(folder / RIGS, json_text({"rigs": rigs}, indent=1) + "\n")
     lives = [rig["fatigue"] for rig in rigs if rig["fatigue"] is not None]
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory() as pictures:
         text = render(
             "batch.html",
             title="Batch of sessions",
@@ -165,9 +162,9 @@ def write_page(path: Path, rows: Sequence[Row], rigs: Sequence[Row]) -> None:
             repeated=sum(rig["repeated"] for rig in rigs),
             head=COLUMNS,
             sessions=list(map(_cells, rows)),
-            trends=list(_trends(rows, rigs, Path(folder))),
+            trends=list(_trends(rows, rigs, Path(pictures))),
         )
-    write_atomic(path, text)
+    write_atomic(folder / PAGE, text)
 
 
 def _cells(row: Row) -> tuple[object, ...]:
