@@ -5,6 +5,8 @@ time. rclpy's events executor calls back once for every arrived message, in one 
 taken from it before they are read. If even that is too slow, `CallbackTurns` drops the executor's row.
 """
 
+from __future__ import annotations
+
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping

@@ -1,5 +1,7 @@
 """rclpy in a process: context, executor, message types and QoS."""
 
+from __future__ import annotations
+
 import os
 import re
 import time

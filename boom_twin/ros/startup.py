@@ -1,5 +1,7 @@
 """Start of a ROS process: signal handling, and a clear error where rclpy is missing."""
 
+from __future__ import annotations
+
 import os
 import signal
 import subprocess

@@ -1,5 +1,7 @@
 """Record topics over DDS into a session bag, message bytes untouched, with the parameters of the running twin."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -1,5 +1,7 @@
 """Subscriptions of the recorder: topics, QoS and type definitions."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

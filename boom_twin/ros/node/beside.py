@@ -1,5 +1,7 @@
 """Work beside the callbacks of a node: in a thread, and the live page in a process."""
 
+from __future__ import annotations
+
 import subprocess
 from collections.abc import Callable
 from threading import Thread

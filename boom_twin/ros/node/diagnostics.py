@@ -1,5 +1,7 @@
 """Publish the node's state on ``/diagnostics``, log irregular samples once, and check the peers of its topics."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace

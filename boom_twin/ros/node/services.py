@@ -1,5 +1,7 @@
 """Services of the node: start again from rest, set the zero of a sensor, acknowledge alarms; log lines of their effect."""
 
+from __future__ import annotations
+
 import re
 import time
 from collections.abc import Callable
