@@ -21,7 +21,7 @@ from ..report.page import HOUR, render
 from ..system.atomic_files import write_atomic
 from ..system.result_text import json_text
 from ..types import SECOND, sensor_kind
-from .folder import SESSIONS
+from .folder import PAGE, RIGS, SESSIONS
 from .session_task import OK, Row
 
 DAY = 86400.0  # s
@@ -44,45 +44,8 @@ class Drift:
     is_significant: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Life:
-    """Fatigue of a rig's station with the largest damage, summed over sessions."""
-
-    category: float  # detail category, MPa
-    station: str
-    damage: float
-    sigma: float | None  # standard deviation from the scatter of sessions; None below `LEAST_SESSIONS`
-    largest_share: float  # largest share of `damage` by one session
-    sessions: int
-    hours: float  # total of these sessions
-    has_heights: bool  # heights of the sections are in the scene
-    stations: dict[str, float]  # damage of every station
-
-    @property
-    def hours_to_end(self) -> float | None:
-        """Hours of the same work until the damage is 1; None without damage."""
-        return hours_to_end(self.damage, self.hours)
-
-    def hours_a_year(self, years: float) -> float | None:
-        """Return the hours per year of the same work until a damage of 1 in `years`; None without damage."""
-        return None if self.hours_to_end is None else self.hours_to_end / years
-
-
-@dataclass(frozen=True, slots=True)
-class RigSummary:
-    """Summary of one rig. Sessions with equal files count once."""
-
-    rig: str
-    sessions: int
-    repeated: int  # sessions left out, because another one has equal files
-    hours: float
-    alarmed: int  # sessions with alarms
-    causes: dict[str, int]  # sessions in which a cause was named
-    life: Life | None  # None unless fatigue was asked for
-    drifts: list[Drift]
-
-
-def rigs_of(rows: Sequence[Row]) -> list[RigSummary]:
+def rigs_of(rows: Sequence[Row]) -> list[Row]:
+    """Return the summary of each rig with a finished session, as in ``rigs.json``, sorted by name."""
     return [_summary(rig, found) for rig, found in _finished_by_rig(rows)]
 
 
@@ -97,45 +60,48 @@ def _figures(rows: Sequence[Row], beginnings: tuple[str, ...]) -> list[str]:
     return sorted({name for row in rows for name in row if name.startswith(beginnings) and not name.endswith("_sigma")})
 
 
-def as_dict(rig: RigSummary) -> dict[str, object]:
-    """Return a summary as plain values, including hours to damage 1."""
-    life = rig.life
-    told = None if life is None else {
-        "detail_category_MPa": life.category, "station": life.station, "damage": life.damage, "damage_sigma": life.sigma,
-        "damage_largest_share": life.largest_share, "sessions": life.sessions, "hours": life.hours,
-        "section_heights_given": life.has_heights, "hours_to_damage_1": life.hours_to_end,
-        **{f"hours_a_year_for_{years}_years": life.hours_a_year(years) for years in LIVES},
-        "damage_by_station": life.stations,
-    }  # fmt: skip
-    return {
-        "rig": rig.rig, "sessions": rig.sessions, "repeated": rig.repeated, "hours": rig.hours, "with_alarms": rig.alarmed,
-        "causes": rig.causes, "fatigue": told, "drifts": rig.drifts,
-    }  # fmt: skip
-
-
-def _summary(rig: str, rows: list[Row]) -> RigSummary:
-    once = [*{row["file_sha256"]: row for row in reversed(rows)}.values()][::-1]
+def _summary(rig: str, rows: list[Row]) -> Row:
+    once = [*{row["file_sha256"]: row for row in reversed(rows)}.values()][::-1]  # sessions with equal files count once
     causes = Counter(cause for row in once for cause in {alarm["cause"] for alarm in row["alarms"]} if cause)
-    drifts = [drift for name in _figures(once, DRIFTING) if (drift := drift_of(name, once)) is not None]
-    hours, alarmed = sum(row["duration_s"] for row in once) / HOUR, sum(bool(row["alarms"]) for row in once)
-    return RigSummary(rig, len(once), len(rows) - len(once), hours, alarmed, dict(causes.most_common()), _life(once), drifts)
+    return {
+        "rig": rig,
+        "sessions": len(once),
+        "repeated": len(rows) - len(once),
+        "hours": sum(row["duration_s"] for row in once) / HOUR,
+        "with_alarms": sum(bool(row["alarms"]) for row in once),
+        "causes": dict(causes.most_common()),  # number of sessions in which each was named
+        "fatigue": _fatigue(once),
+        "drifts": [drift for name in _figures(once, DRIFTING) if (drift := drift_of(name, once)) is not None],
+    }
 
 
-def _life(rows: list[Row]) -> Life | None:
+def _fatigue(rows: list[Row]) -> Row | None:
+    """Return damage and life of the station with the largest damage, summed over sessions; None if it was not counted."""
     own = [row for row in rows if any(name.startswith(DAMAGE) for name in row)]
     if not own:
         return None
     names = dict.fromkeys(name for row in own for name in row if name.startswith(DAMAGE))
-    sums = {name: sum(row.get(name, 0.0) for row in own) for name in names}
+    sums = {name.removeprefix(DAMAGE): sum(row.get(name, 0.0) for row in own) for name in names}
     worst = max(sums, key=lambda name: sums[name])
-    damages, hours = np.array([row.get(worst, 0.0) for row in own]), np.array([row["duration_s"] / HOUR for row in own])
+    damages, hours = (np.array([row.get(name, 0.0) for row in own]) for name in (DAMAGE + worst, "duration_s"))
+    hours = hours / HOUR
     total, count, sigma = sums[worst], len(own), None
     if count >= LEAST_SESSIONS:  # ratio estimate: scatter about the mean damage per hour
         sigma = float(np.sqrt(count / (count - 1) * np.sum((damages - total / hours.sum() * hours) ** 2)))
-    share, has_heights = damages.max() / total if total > 0.0 else 0.0, all(row["section_heights_given"] for row in own)
-    stations = {name.removeprefix(DAMAGE): value for name, value in sums.items()}
-    category, station = own[0]["fatigue_category_MPa"], worst.removeprefix(DAMAGE)
-    return Life(category, station, total, sigma, float(share), count, float(hours.sum()), has_heights, stations)
+    end = hours_to_end(total, float(hours.sum()))
+    return {
+        "detail_category_MPa": own[0]["fatigue_category_MPa"],
+        "station": worst,
+        "damage": total,
+        "damage_sigma": sigma,  # None below `LEAST_SESSIONS`
+        "damage_largest_share": float(damages.max() / total) if total > 0.0 else 0.0,  # of one session
+        "sessions": count,
+        "hours": float(hours.sum()),
+        "section_heights_given": all(row["section_heights_given"] for row in own),
+        "hours_to_damage_1": end,
+        **{f"hours_a_year_for_{years}_years": None if end is None else end / years for years in LIVES},
+        "damage_by_station": sums,
+    }
 
 
 def drift_of(name: str, rows: Sequence[Row]) -> Drift | None:
@@ -165,10 +131,6 @@ def _is_number(value: object) -> bool:
     return isinstance(value, float | int) and isfinite(value)
 
 
-def write_rigs(path: Path, rigs: Sequence[RigSummary]) -> None:
-    write_atomic(path, json_text({"rigs": [as_dict(rig) for rig in rigs]}, indent=1) + "\n")
-
-
 def counts(rows: Sequence[Row]) -> tuple[int, int]:
     right = sum(row["status"] == OK for row in rows)
     return right, len(rows) - right
@@ -182,11 +144,12 @@ TRENDS = ("residual_rms_", "frequency_ratio_mode_", "damping_mode_", "calibrated
 """First part of the names of figures that are drawn over time."""
 
 
-def write_page(path: Path, rows: Sequence[Row], rigs: Sequence[RigSummary]) -> None:
-    """Write the page beside the folder of the replays. The page loads nothing from other files."""
-    right, wrong = counts(rows)
-    lives = [rig.life for rig in rigs if rig.life is not None]
-    with TemporaryDirectory() as folder:
+def write_summaries(folder: Path, rows: Sequence[Row]) -> None:
+    """Write ``rigs.json`` and the page beside the folder of the replays. The page loads nothing from other files."""
+    rigs, (right, wrong) = rigs_of(rows), counts(rows)
+    write_atomic(folder / RIGS, json_text({"rigs": rigs}, indent=1) + "\n")
+    lives = [rig["fatigue"] for rig in rigs if rig["fatigue"] is not None]
+    with TemporaryDirectory() as pictures:
         text = render(
             "batch.html",
             title="Batch of sessions",
@@ -195,15 +158,15 @@ def write_page(path: Path, rows: Sequence[Row], rigs: Sequence[RigSummary]) -> N
             alarmed=sum(bool(row.get("alarms")) for row in rows),
             rig_head=RIG_COLUMNS,
             rigs=map(_rig_cells, rigs),
-            category=f"{lives[0].category:g}" if lives else None,
-            has_heights=all(life.has_heights for life in lives),
+            category=f"{lives[0]['detail_category_MPa']:g}" if lives else None,
+            has_heights=all(life["section_heights_given"] for life in lives),
             least=LEAST_SESSIONS,
-            repeated=sum(rig.repeated for rig in rigs),
+            repeated=sum(rig["repeated"] for rig in rigs),
             head=COLUMNS,
             sessions=list(map(_cells, rows)),
-            trends=list(_trends(rows, rigs, Path(folder))),
+            trends=list(_trends(rows, rigs, Path(pictures))),
         )
-    write_atomic(path, text)
+    write_atomic(folder / PAGE, text)
 
 
 def _cells(row: Row) -> tuple[object, ...]:
@@ -234,15 +197,15 @@ RIG_COLUMNS = (
 )  # fmt: skip
 
 
-def _rig_cells(rig: RigSummary) -> tuple[object, ...]:
-    causes = ", ".join(f"{cause} ({count})" for cause, count in rig.causes.items()) or "none"
-    start: tuple[object, ...] = rig.rig, rig.sessions, rig.hours, rig.alarmed, causes
-    if (life := rig.life) is None:
+def _rig_cells(rig: Row) -> tuple[object, ...]:
+    causes = ", ".join(f"{cause} ({count})" for cause, count in rig["causes"].items()) or "none"
+    start: tuple[object, ...] = rig["rig"], rig["sessions"], rig["hours"], rig["with_alarms"], causes
+    if (life := rig["fatigue"]) is None:
         return *start, *[None] * (len(RIG_COLUMNS) - len(start))
-    damage = f"{life.damage:.3g}" + ("" if life.sigma is None else f" ± {life.sigma:.1g}")
-    years = (yearly_as_text(life.hours_a_year(years)) for years in LIVES)
-    place = life.station.replace("_", " ") + " m"
-    return *start, damage, place, 100.0 * life.largest_share, hours_as_text(life.hours_to_end), *years
+    damage = f"{life['damage']:.3g}" + ("" if life["damage_sigma"] is None else f" ± {life['damage_sigma']:.1g}")
+    years = (yearly_as_text(life[f"hours_a_year_for_{years}_years"]) for years in LIVES)
+    place, share = life["station"].replace("_", " ") + " m", 100.0 * life["damage_largest_share"]
+    return *start, damage, place, share, hours_as_text(life["hours_to_damage_1"]), *years
 
 
 def _drift_cells(drift: Drift) -> tuple[object, ...]:
@@ -256,16 +219,16 @@ def _with_unit(name: str) -> str:
     return name if channel == name else f"{name}, {sensor_kind(channel).unit}"
 
 
-def _trends(rows: Sequence[Row], summaries: Sequence[RigSummary], folder: Path) -> Iterator[dict[str, object]]:
+def _trends(rows: Sequence[Row], summaries: Sequence[Row], folder: Path) -> Iterator[dict[str, object]]:
     """Yield name, drifts and picture in `folder` of wear-related figures over time, for every rig with several sessions."""
     max_trends = 24
-    by_name = {rig.rig: rig for rig in summaries}
+    by_name = {rig["rig"]: rig for rig in summaries}
     for number, (rig, found) in enumerate(_finished_by_rig(rows)):
         trends = [trend for name in _figures(found, TRENDS) if len((trend := _trend(name, found)).values) > 1][:max_trends]
         if trends:
             picture = folder / f"{number}.png"
             trends_picture(picture, rig, trends)
-            drifts = sorted(by_name[rig].drifts, key=lambda drift: not drift.is_significant)
+            drifts = sorted(by_name[rig]["drifts"], key=lambda drift: not drift.is_significant)
             labels = "; ".join(trend.label for trend in trends)
             yield {"name": rig, "drifts": list(map(_drift_cells, drifts)), "picture": picture, "labels": labels}
 

@@ -42,7 +42,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Replay what is not done yet, and write the table of all; exit code 1 if a session failed."""
     from ..batch.folder import PAGE, RIGS, TABLE, batch_folder, sessions_of, write_table
-    from ..batch.results import counts, rigs_of, write_page, write_rigs
+    from ..batch.results import counts, write_summaries
     from ..batch.session_task import REMEDY, connected, rows_of
 
     if missing := [name for name in ("pyarrow", "psutil") if find_spec(name) is None]:
@@ -67,9 +67,7 @@ def run(args: Namespace) -> int:
                     folder.mark(len(tasks), len(done))
         rows = [done[task.key] for task in tasks]
         write_table(folder.folder / TABLE, rows)
-        rigs = rigs_of(rows)
-        write_rigs(folder.folder / RIGS, rigs)
-        write_page(folder.folder / PAGE, rows, rigs)
+        write_summaries(folder.folder, rows)
         folder.mark(len(tasks), len(done))
     right, wrong = counts(rows)
     print(f"{right} sessions right, {wrong} failed")

@@ -47,33 +47,19 @@ def run(args: Namespace) -> int:
         for number, rest in enumerate(rests, 1):
             files.append(f"rest_{number}.png")
             title = f"{session.name}, rest period {rest.start:.1f} to {rest.stop:.1f} s"
-            found = np.array([(each.frequency, each.frequency_sigma) for each in rest.modes]).reshape(-1, 2)
+            found = np.array([(each["frequency_Hz"], each["frequency_sigma_Hz"]) for each in rest.modes]).reshape(-1, 2)
             stabilisation_picture(building / files[-1], title, rest.poles, found, rest.model)
-        write_atomic(building / "modes.json", json.dumps([_as_object(rest) for rest in rests], indent=2) + "\n")
+        content = [
+            {"start_s": rest.start, "stop_s": rest.stop, "model_Hz": rest.model.tolist(), "modes": rest.modes} for rest in rests
+        ]
+        write_atomic(building / "modes.json", json.dumps(content, indent=2) + "\n")
     print_result(args.json, _flat(rests), [*_as_text(rests), *(str(out / name) for name in files)])
     return 0
 
 
-def _as_object(rest: MeasuredRest) -> dict[str, Any]:
-    modes = [
-        {
-            "frequency_Hz": each.frequency,
-            "frequency_sigma_Hz": each.frequency_sigma,
-            "damping_ratio": each.damping,
-            "damping_ratio_sigma": each.damping_sigma,
-            "orders": each.orders,
-            "is_line_of_a_load": each.is_line,
-            "model_Hz": each.model,
-            "shape": dict(zip(rest.channels, each.shape.tolist(), strict=True)),
-        }
-        for each in rest.modes
-    ]
-    return {"start_s": rest.start, "stop_s": rest.stop, "model_Hz": rest.model.tolist(), "modes": modes}
-
-
 def _flat(rests: list[MeasuredRest]) -> dict[str, Any]:
     """Return the modes of all rest periods as lists of equal length, without their shapes."""
-    rows = [(number, mode) for number, rest in enumerate(rests, 1) for mode in _as_object(rest)["modes"]]
+    rows = [(number, mode) for number, rest in enumerate(rests, 1) for mode in rest.modes]
     names = ("frequency_Hz", "frequency_sigma_Hz", "damping_ratio", "damping_ratio_sigma", "model_Hz")
     found: dict[str, Any] = {"rest_start_s": [rest.start for rest in rests], "rest_stop_s": [rest.stop for rest in rests]}
     found["rest"] = [number for number, _ in rows]
@@ -85,10 +71,10 @@ def _as_text(rests: list[MeasuredRest]) -> list[str]:
     for number, rest in enumerate(rests, 1):
         lines.append(f"rest period {number}, {rest.start:.1f} to {rest.stop:.1f} s")
         for each in rest.modes:
-            model = "no mode of the model is near" if each.model is None else f"model {each.model:.3f} Hz"
-            note = ", hardly damped: the line of a pump rather than a mode" if each.is_line else ""
-            frequency = f"{each.frequency:7.3f} +- {each.frequency_sigma:.3f} Hz"
-            damping = f"damping ratio {100.0 * each.damping:5.2f} +- {100.0 * each.damping_sigma:.2f} %"
+            model = "no mode of the model is near" if each["model_Hz"] is None else f"model {each['model_Hz']:.3f} Hz"
+            note = ", hardly damped: the line of a pump rather than a mode" if each["is_line_of_a_load"] else ""
+            frequency = f"{each['frequency_Hz']:7.3f} +- {each['frequency_sigma_Hz']:.3f} Hz"
+            damping = f"damping ratio {100.0 * each['damping_ratio']:5.2f} +- {100.0 * each['damping_ratio_sigma']:.2f} %"
             lines.append(f"  {frequency}, {damping}, {model}{note}")
         if not rest.modes:
             lines.append("  no stable mode: record longer, or under more wind")

@@ -10,7 +10,6 @@ import asyncio
 import json
 import time
 from collections.abc import Collection
-from dataclasses import asdict
 from math import isfinite
 from typing import Any
 from unicodedata import category
@@ -179,7 +178,7 @@ class Viewer:
             found = await self._analyst.rates_at(self._position)
             if found is not sent:
                 sent = found
-                await self._send_text({"kind": "rates", **asdict(found)})
+                await self._send_text({"kind": "rates", **found})
             await asyncio.sleep(SPECTRUM_PERIOD)
 
     @property

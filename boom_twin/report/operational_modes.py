@@ -26,29 +26,14 @@ SHORTEST_REST = 20.0  # s
 
 
 @dataclass(frozen=True, slots=True)
-class OperationalMode:
-    """One measured mode."""
-
-    frequency: float  # Hz
-    frequency_sigma: float  # standard deviation
-    damping: float  # ratio, 1
-    damping_sigma: float
-    orders: int  # model orders at which its pole is stable
-    is_line: bool  # True if it hardly decays: the line of a pump rather than a mode
-    shape: Array  # (channels,), amplitudes in standard deviations of each sensor in the rest period, relative to the largest
-    model: float | None  # natural frequency of the nearest mode of the model, Hz
-
-
-@dataclass(frozen=True, slots=True)
 class MeasuredRest:
     """Modes of one rest period."""
 
     start: float  # s since the first stroke sample of the session
     stop: float
-    channels: tuple[str, ...]  # sensors of the shapes
     model: Array  # natural frequencies of the model, Hz
     poles: Array  # (poles, 3), frequency (Hz), model order, and 1 if the pole is stable, else 0
-    modes: tuple[OperationalMode, ...]
+    modes: list[dict[str, Any]]  # as in ``modes.json``
 
 
 def measured_rests(session: MeasuredSession, scene: Scene, rigging: Rigging) -> list[MeasuredRest]:
@@ -78,8 +63,9 @@ def _measured(name: str, period: RestPeriod, scene: Scene, rigging: Rigging) -> 
     boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads)
     boom.start(period.strokes)
     model = boom.posture.omega[: boom.posture.modes[0]] / (2.0 * np.pi)
-    modes = tuple(_mode(each, shape, model) for each, shape in zip(groups, shapes, strict=True))
-    return MeasuredRest(period.start, period.start + float(period.times[-1]), tuple(order), model.copy(), poles, modes)
+    named = [dict(zip(order, shape.tolist(), strict=True)) for shape in shapes]
+    modes = [_mode(each, shape, model) for each, shape in zip(groups, named, strict=True)]
+    return MeasuredRest(period.start, period.start + float(period.times[-1]), model.copy(), poles, modes)
 
 
 def _even(period: RestPeriod, channel: int) -> Array | None:
@@ -148,12 +134,19 @@ def _shapes(values: Array, leading: int, frequencies: list[float]) -> list[Array
     return [np.real(each / each[np.argmax(np.abs(each))]) for each in picked]
 
 
-def _mode(group: Array, shape: Array, model: Array) -> OperationalMode:
+def _mode(group: Array, shape: dict[str, float], model: Array) -> dict[str, Any]:
+    """Return the mode of stable poles. `shape` has amplitudes in each sensor's standard deviations, relative to the largest."""
     line_damping = 0.002  # damping ratio below which it is a pump's line
     frequency, damping, frequency_sigma, damping_sigma = np.median(group, axis=0).tolist()
     distance = 0.2  # largest relative distance of a measured mode from its mode of the model
     near = [float(each) for each in model if abs(each - frequency) <= distance * each]
-    nearest = min(near, key=lambda each: abs(each - frequency), default=None)
-    return OperationalMode(
-        frequency, frequency_sigma, damping, damping_sigma, len(group), damping < line_damping, shape, nearest
-    )
+    return {
+        "frequency_Hz": frequency,
+        "frequency_sigma_Hz": frequency_sigma,
+        "damping_ratio": damping,
+        "damping_ratio_sigma": damping_sigma,
+        "orders": len(group),  # model orders at which its pole is stable
+        "is_line_of_a_load": damping < line_damping,
+        "model_Hz": min(near, key=lambda each: abs(each - frequency), default=None),
+        "shape": shape,
+    }

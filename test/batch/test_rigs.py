@@ -37,16 +37,17 @@ def test_damage_and_hours_add_up_by_rig_and_a_copy_counts_once() -> None:
     rows = [worn(0, 1e-5, 2e-5), worn(1, 3e-5, alarms=[alarm, alarm]), row(2, hours=5.0), worn(3, 2e-5, rig="two")]
     rows += [{**rows[0], "first_stamp_ns": 9 * DAY}, {"status": "failed", "rig": "one"}]
     one, two = rigs_of(rows)
-    assert (one.rig, one.sessions, one.repeated, one.hours, one.alarmed) == ("one", 3, 1, 9.0, 1)
-    assert one.causes == {"cylinder_2.k": 1} and one.life is not None and two.life is not None
-    assert (one.life.damage, one.life.hours, one.life.sessions) == (pytest.approx(4e-5), 4.0, 2)
-    assert one.life.station == "section_1_at_0.60" and one.life.largest_share == pytest.approx(0.75) and one.life.sigma is None
-    assert one.life.hours_to_end == pytest.approx(4.0 / 4e-5) and one.life.hours_a_year(20) == pytest.approx(5000.0)
-    assert two.life.station == "section_1_at_0.60" and two.hours == 2.0
+    assert [one[key] for key in ("rig", "sessions", "repeated", "hours", "with_alarms")] == ["one", 3, 1, 9.0, 1]
+    assert one["causes"] == {"cylinder_2.k": 1}
+    life, station = one["fatigue"], "section_1_at_0.60"
+    assert (life["damage"], life["hours"], life["sessions"]) == (pytest.approx(4e-5), 4.0, 2)
+    assert life["station"] == station and life["damage_largest_share"] == pytest.approx(0.75) and life["damage_sigma"] is None
+    assert life["hours_to_damage_1"] == pytest.approx(1e5) and life["hours_a_year_for_20_years"] == pytest.approx(5000.0)
+    assert two["fatigue"]["station"] == station and two["hours"] == 2.0
     (idle,) = rigs_of([worn(0, 0.0)])
-    assert idle.life is not None and idle.life.hours_to_end is None is idle.life.hours_a_year(10)
+    assert idle["fatigue"]["hours_to_damage_1"] is None is idle["fatigue"]["hours_a_year_for_10_years"]
     (unknown,) = rigs_of([row(0)])
-    assert unknown.life is None and unknown.drifts == []
+    assert unknown["fatigue"] is None and unknown["drifts"] == []
 
 
 def test_the_scatter_of_damage_is_that_of_random_sessions() -> None:
@@ -54,9 +55,8 @@ def test_the_scatter_of_damage_is_that_of_random_sessions() -> None:
     totals, sigmas = [], []
     for _ in range(300):
         (found,) = rigs_of([worn(number, float(random.exponential(1e-5))) for number in range(30)])
-        assert found.life is not None and found.life.sigma is not None
-        totals.append(found.life.damage)
-        sigmas.append(found.life.sigma)
+        totals.append(found["fatigue"]["damage"])
+        sigmas.append(found["fatigue"]["damage_sigma"])
     assert np.mean(sigmas) == pytest.approx(np.std(totals), rel=0.15)
 
 
@@ -67,17 +67,17 @@ def calibrated(values: Any, sigma: float) -> list[dict[str, Any]]:
 
 def test_a_drift_is_the_line_of_least_squares() -> None:
     values = 5e7 - 2e5 * np.arange(12) + 1e5 * np.random.default_rng(1).normal(size=12)
-    (found,) = rigs_of(calibrated(values, 1e3))[0].drifts
+    (found,) = rigs_of(calibrated(values, 1e3))[0]["drifts"]
     line = stats.linregress(np.arange(12), values)  # the scatter is larger than the stated deviations
     assert found.change == pytest.approx(11.0 * line.slope) and found.sigma == pytest.approx(11.0 * line.stderr)
     assert found.first == pytest.approx(line.intercept) and found.days == 11.0 and found.is_significant
-    (wide,) = rigs_of(calibrated(values, 1e7))[0].drifts
+    (wide,) = rigs_of(calibrated(values, 1e7))[0]["drifts"]
     assert wide.sigma == pytest.approx(11.0 * 1e7 / np.sqrt(143.0)) and not wide.is_significant
 
 
 def test_figures_that_only_scatter_seldom_drift() -> None:
     random = np.random.default_rng(3)
-    found = [rigs_of(calibrated(random.normal(size=6), 1.0))[0].drifts[0].is_significant for _ in range(2000)]
+    found = [rigs_of(calibrated(random.normal(size=6), 1.0))[0]["drifts"][0].is_significant for _ in range(2000)]
     assert sum(found) <= 8, "one in a thousand"
 
 
@@ -90,7 +90,7 @@ def test_figures_that_only_scatter_seldom_drift() -> None:
     ],
 )
 def test_a_drift_that_cannot_be_known_is_not_told(rows: list[dict[str, Any]]) -> None:
-    assert rigs_of(rows)[0].drifts == []
+    assert rigs_of(rows)[0]["drifts"] == []
 
 
 def named(folder: Path, name: str, rig: str, seconds: float) -> None:

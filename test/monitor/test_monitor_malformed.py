@@ -140,7 +140,7 @@ class Bench:
 
     def lost(self, role: Role | None = None) -> tuple[int, str]:
         loss = self.topic_rows.dropped.by_topic.get(TOPICS.events.absolute if role is None else topic(role).absolute)
-        return (0, "") if loss is None else (loss.count, loss.reason)
+        return (0, "") if loss is None else (loss["count"], loss["reason"])
 
 
 MALFORMED: dict[str, tuple[Role | None, Callable[[], Any], str]] = {

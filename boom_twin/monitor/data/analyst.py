@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -42,28 +42,24 @@ SIGNALS = (
 RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)  # of the response of the tip, Hz
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RatesToAvoid:
-    """Pump rates from and to (Hz) at which the tip swings too much in a posture; why they are not known."""
-
-    avoid: tuple[tuple[float, float], ...] = ()
-    trouble: str = ""
+Rates = dict[str, Any]
+"""Content of the message ``rates``: in ``avoid`` ranges of pump rates (Hz), in ``trouble`` why they are not known."""
 
 
-class RateList(PresentPosture[RatesToAvoid]):
+class RateList(PresentPosture[Rates]):
     """Pump rates to avoid, from the frequency response of the tip to 1 N there."""
 
     def __init__(self, scene: Scene) -> None:
         super().__init__()
         self._scene = scene
 
-    def _work_out(self, strokes: Array) -> RatesToAvoid:
+    def _work_out(self, strokes: Array) -> Rates:
         try:
             boom = linearised_boom(self._scene, strokes)
             response = boom.respond(RESPONSE_FREQUENCIES, boom.load(UPWARD)).tip_acceleration
         except BoomTwinError as error:
-            return RatesToAvoid(trouble=str(error))
-        return RatesToAvoid(rates_to_avoid(np.linalg.norm(response, axis=1)))
+            return {"avoid": (), "trouble": str(error)}
+        return {"avoid": rates_to_avoid(np.linalg.norm(response, axis=1)), "trouble": ""}
 
 
 PUMP_RATES = np.linspace(0.2, 1.2, 201)  # rates of a pump, Hz
@@ -89,20 +85,15 @@ SPECTRUM_SPAN = 40.0  # time span of the spectrum, up to the shown time, s
 
 
 @dataclass(frozen=True, slots=True)
-class Peak:
-    """Peak of the spectrum: frequency (Hz), density ((m/s^2)^2/Hz)."""
-
-    frequency: float
-    density: float
-
-
-@dataclass(frozen=True, slots=True)
 class Spectrum:
-    """Spectrum: frequencies (k,) in Hz, one-sided densities (k, c) in (m/s^2)^2/Hz, peaks of their sum by frequency."""
+    """Spectrum: frequencies (k,) in Hz, one-sided densities (k, c) in (m/s^2)^2/Hz, peaks of their sum by frequency.
+
+    A peak has a ``frequency`` and a ``density``.
+    """
 
     frequencies: Array
     densities: Array
-    peaks: tuple[Peak, ...]
+    peaks: list[dict[str, float]]
 
 
 def spectrum(times: Array, values: Array) -> Spectrum | None:
@@ -116,11 +107,11 @@ def spectrum(times: Array, values: Array) -> Spectrum | None:
     values = np.stack([np.interp(even, times, column) for column in values.T], axis=1)
     length = min(round(SEGMENT * rate), len(even))
     frequencies, densities, _ = power_density(values, 1.0 / rate, length)
-    peaks = tuple(sorted(_peaks(frequencies, densities.sum(axis=1), rate), key=lambda peak: peak.frequency))
+    peaks = sorted(_peaks(frequencies, densities.sum(axis=1), rate), key=lambda peak: peak["frequency"])
     return Spectrum(frequencies, densities, peaks)
 
 
-def _peaks(frequencies: Array, density: Array, rate: float) -> list[Peak]:
+def _peaks(frequencies: Array, density: Array, rate: float) -> list[dict[str, float]]:
     """Return the highest prominent peaks. Their frequency is from a parabola through the decibels."""
     max_peaks = 5
     lowest_peak, highest_peak = 0.3, 30.0  # frequencies of peaks, Hz
@@ -133,12 +124,12 @@ def _peaks(frequencies: Array, density: Array, rate: float) -> list[Peak]:
         bend = below - 2.0 * top + above
         offset = 0.5 * (below - above) / bend if bend else 0.0
         frequency = float(frequencies[i] + offset * (frequencies[1] - frequencies[0]))
-        peaks.append(Peak(frequency, float(density[i])))
+        peaks.append({"frequency": frequency, "density": float(density[i])})
     return peaks
 
 
-UNKNOWN_SCENE = RatesToAvoid(trouble="the model is not known: give --scene")
-UNKNOWN_POSTURE = RatesToAvoid(trouble="the posture is not known yet")
+UNKNOWN_SCENE: Rates = {"avoid": (), "trouble": "the model is not known: give --scene"}
+UNKNOWN_POSTURE: Rates = {"avoid": (), "trouble": "the posture is not known yet"}
 
 
 class Analyst:
@@ -176,7 +167,7 @@ class Analyst:
             self._known = key, ({**lines, "moved": moved if moved > MOVED else 0.0}, block)
             return self._known[1]
 
-    async def rates_at(self, time: float) -> RatesToAvoid:
+    async def rates_at(self, time: float) -> Rates:
         """Return the pump rates to avoid in the posture at `time` (s); the same object while the boom has not moved.
 
         It has a model of its own, so that no spectrum waits for the first one, which compiles for half a minute.
@@ -206,14 +197,14 @@ class Analyst:
         return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
 
     @staticmethod
-    def _placed(peak: Peak, natural: list[float]) -> dict[str, Any]:
+    def _placed(peak: dict[str, float], natural: list[float]) -> dict[str, Any]:
         """Return a peak with the number of its mode and its deviation from the model; None without a mode near it."""
         mode_distance = 0.2  # relative distance up to which a peak is taken for a mode of the model
-        told: dict[str, Any] = {**asdict(peak), "mode": None, "deviation": None}
-        mode = int(np.argmin(np.abs(np.array(natural) - peak.frequency))) + 1 if natural else 0
-        if not mode or abs(natural[mode - 1] - peak.frequency) > mode_distance * natural[mode - 1]:
-            return told
-        return told | {"mode": mode, "deviation": peak.frequency / natural[mode - 1] - 1.0}
+        frequency = peak["frequency"]
+        mode = int(np.argmin(np.abs(np.array(natural) - frequency))) + 1 if natural else 0
+        if not mode or abs(natural[mode - 1] - frequency) > mode_distance * natural[mode - 1]:
+            return {**peak, "mode": None, "deviation": None}
+        return {**peak, "mode": mode, "deviation": frequency / natural[mode - 1] - 1.0}
 
     def _natural(self, strokes: list[float]) -> list[float]:
         scene = self._feed.scene()

@@ -9,7 +9,6 @@ import logging
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
 from math import isnan
 from operator import itemgetter
 from typing import Any
@@ -171,20 +170,11 @@ class MalformedError(Exception):
     """Error of a message that cannot be used; the text states why."""
 
 
-@dataclass(slots=True)
-class TopicLoss:
-    """Count of the dropped messages of one topic, and the reason of the last one."""
-
-    topic: str
-    count: int
-    reason: str
-
-
 class DroppedMessages:
     """Counter of dropped messages; each is logged, at the rate of `boom_twin.monitor.access_control.LogRateLimit`."""
 
     def __init__(self) -> None:
-        self.by_topic: dict[str, TopicLoss] = {}
+        self.by_topic: dict[str, dict[str, Any]] = {}  # topic, count, and reason of the last one
 
     @contextmanager
     def guard(self, topic: str) -> Iterator[None]:
@@ -197,13 +187,13 @@ class DroppedMessages:
             self._add(topic, f"cannot be read: {type(error).__name__}: {error}")
 
     def losses(self) -> list[dict[str, Any]]:
-        """Return the losses as plain values, the most messages first."""
-        return [asdict(loss) for loss in sorted(self.by_topic.values(), key=lambda loss: -loss.count)]
+        """Return the losses of all topics, the most messages first."""
+        return sorted(self.by_topic.values(), key=lambda loss: -loss["count"])
 
     def _add(self, topic: str, reason: str) -> None:
-        loss = self.by_topic.setdefault(topic, TopicLoss(topic, 0, ""))
-        loss.count, loss.reason = loss.count + 1, printable(reason[:LONGEST_REASON], keep="")
-        LOG.getChild(topic).warning("dropped message %d of %s: %s", loss.count, topic, loss.reason)
+        count = self.by_topic[topic]["count"] + 1 if topic in self.by_topic else 1
+        self.by_topic[topic] = {"topic": topic, "count": count, "reason": printable(reason[:LONGEST_REASON], keep="")}
+        LOG.getChild(topic).warning("dropped message %d of %s: %s", count, topic, self.by_topic[topic]["reason"])
 
 
 def check_stamp(msg: Any) -> int:

@@ -69,7 +69,12 @@ class ParameterChanges:
 
     def hand_over(self, row: int) -> None:
         """Set the parameters of all changed objects for step `row`."""
-        shares = [float(share[row]) for share in self._shares]
+        self._set_shares([float(share[row]) for share in self._shares])
+
+    def restore(self) -> None:
+        self._set_shares([0.0] * len(self._shares))
+
+    def _set_shares(self, shares: list[float]) -> None:
         if shares == self._last:
             return
         self._last = shares
@@ -79,10 +84,6 @@ class ParameterChanges:
                 for name, value in more.items():
                     values[name] += share * value
             _set(self._system, number, values, {name for more in self._more[number] for name in more})
-
-    def restore(self) -> None:
-        for number, old in self._healthy.items():
-            _set(self._system, number, old, {name for more in self._more[number] for name in more})
 
 
 def _objects(boom: Boom) -> list[dict[str, float]]:
@@ -167,14 +168,14 @@ def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> An
 
 
 def _feed(boom: Boom, course: Course, step: float) -> None:
-    """Hand the moving drives, before every step, their lengths without force at its end, and load and parameters there."""
+    """Hand the drives, before every step, their lengths without force at its end, and load and parameters there."""
     rests = [_rests(boom, i, course) for i in range(len(boom.drives))]
-    moving = [(*drive, rest) for drive, rest in zip(boom.drives, rests, strict=True) if min(rest) < max(rest)]
+    drives = [(*drive, rest) for drive, rest in zip(boom.drives, rests, strict=True)]
     oils = [(drive[0], _stiffness(boom, i, course).tolist()) for i, drive in enumerate(boom.drives) if _cylinder(boom, i).oil]
-    last = [float("nan")] * len(moving)
+    last = [float("nan")] * len(drives)
 
     def hand_over(row: int) -> None:
-        for i, (drive, name, rest) in enumerate(moving):
+        for i, (drive, name, rest) in enumerate(drives):
             if rest[row] != last[i]:
                 last[i] = rest[row]
                 boom.system.SetObjectParameter(drive, name, rest[row])
@@ -190,11 +191,7 @@ def _feed(boom: Boom, course: Course, step: float) -> None:
             bush.watch(boom.system)
         return True
 
-    for (drive, name), rest in zip(boom.drives, rests, strict=True):
-        boom.system.SetObjectParameter(drive, name, rest[0])
-    course.changes.hand_over(0)
-    for drive, stiffness in oils:
-        boom.system.SetObjectParameter(drive, "stiffness", stiffness[0])
+    hand_over(0)
     for bush in boom.bushes:
         bush.entry = None
     boom.system.SetPreStepUserFunction(before_step)
