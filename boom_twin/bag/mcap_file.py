@@ -34,7 +34,7 @@ from .mcap_records import (
     unpack,
 )
 from .scanner import DamagedBytes, definitions_of, scan_records
-from .session_file import MOST_HELD, PIECE, LogClock, Part, SessionFile, as_bag_error, by_topic, compare_counts
+from .session_file import IN_ORDER, MOST_HELD, PIECE, LogClock, Part, SessionFile, as_bag_error, by_topic, compare_counts
 
 _CRC = PREFIX.size + 24  # offset of the checksum in the record of a chunk
 _MESSAGE = int(Opcode.MESSAGE)
@@ -57,7 +57,7 @@ class McapFile(SessionFile):
 
     pieces: list[Piece] = field(default_factory=list)  # in the order of the file
 
-    def messages(self) -> Iterator[tuple[int, int, bytes]]:
+    def messages(self, clock: LogClock = IN_ORDER) -> Iterator[tuple[int, int, bytes]]:
         """Yield messages as in `SessionFile`, in the order of the file, with one piece in memory."""
         with open_received(self.path) as file:
             for piece in self.pieces:

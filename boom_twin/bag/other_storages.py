@@ -23,7 +23,7 @@ from rosbags.typesys import TypesysError, get_types_from_msg
 from ..errors import BagError
 from ..messages.type_store import jazzy, other_than_jazzy
 from ..system.received_files import holds_file, open_received
-from .session_file import CDR, MOST_HELD, PARSE_ERRORS, PIECE, LogClock, SessionFile, channel_of, schema_of
+from .session_file import CDR, IN_ORDER, MOST_HELD, PARSE_ERRORS, PIECE, LogClock, SessionFile, channel_of, schema_of
 
 MAGIC = b"SQLite format 3\0"
 BESIDE = ("-wal", "-journal")  # suffixes of the files in which sqlite3 keeps data that are not in the database yet
@@ -45,23 +45,16 @@ class SqliteFile(SessionFile):
             pieces = (np.array(piece).T for piece in iter(lambda: rows.fetchmany(_TOGETHER), []))
             return LogClock.of(((channels, times.astype(np.uint64)) for channels, times in pieces), self.counts)
 
-    def messages_by(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
-        """Yield messages as in `SessionFile`: as they were stored, if the clock was set back."""
-        newest = 0
-        for row, (channel, time, data) in enumerate(self.messages("id" if clock.places else "timestamp, id")):
-            place = PIECE * (row // _TOGETHER) + row % _TOGETHER
-            newest = max(newest, time + clock.shifts[bisect_right(clock.places, place)])
-            yield channel, newest, data
-
-    def messages(self, order: str = "timestamp, id") -> Iterator[tuple[int, int, bytes]]:
-        """Yield messages as in `SessionFile`, in the order of their log times.
+    def messages(self, clock: LogClock = IN_ORDER) -> Iterator[tuple[int, int, bytes]]:
+        """Yield messages as in `SessionFile`, in the order of their log times; as they were stored, if the clock was set back.
 
         Raise BagError if the messages have more bytes than the file: columns with a default, or generated, can give any
         number of bytes.
         """
-        left = self.path.stat().st_size
+        left, newest = self.path.stat().st_size, 0
         with _database(self.path) as database:
-            for channel, time, data in database.execute(_MESSAGES + order):
+            rows = database.execute(_MESSAGES + ("id" if clock.places else "timestamp, id"))
+            for row, (channel, time, data) in enumerate(rows):
                 if channel not in self.channels or not isinstance(data, bytes) or not isinstance(time, int) or time < 0:
                     raise BagError(f"{self.path}: a message of topic {channel!r} at {time!r} ns is none. {_REMEDY}")
                 left -= len(data)
@@ -69,7 +62,9 @@ class SqliteFile(SessionFile):
                     raise BagError(
                         f"{self.path}: its messages have more bytes than the file, so are not stored in it. {_REMEDY}"
                     )
-                yield channel, time, data
+                place = PIECE * (row // _TOGETHER) + row % _TOGETHER
+                newest = max(newest, time + clock.shifts[bisect_right(clock.places, place)])
+                yield channel, newest, data
 
 
 def summarise_sqlite(path: Path) -> SqliteFile:
@@ -144,7 +139,7 @@ _MEND = "The file is damaged or was cut off: `rosbag reindex` or `rosbag fix` of
 class Ros1File(SessionFile):
     """Content of one .bag file, which has no checksums."""
 
-    def messages(self) -> Iterator[tuple[int, int, bytes]]:
+    def messages(self, clock: LogClock = IN_ORDER) -> Iterator[tuple[int, int, bytes]]:
         convert = jazzy().ros1_to_cdr
         with _reader(self.path) as reader:
             for connection, time, data in reader.messages():

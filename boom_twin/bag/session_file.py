@@ -153,7 +153,10 @@ class LogClock(NamedTuple):
                     clock.places.append(PIECE * number + row)
                     clock.shifts.append(shift)
         agreed = sum(counts.get(channel, 0) for channel, vote in votes.items() if vote > 0)
-        return clock if 2 * agreed > sum(counts.values()) else cls([], [0])
+        return clock if 2 * agreed > sum(counts.values()) else IN_ORDER
+
+
+IN_ORDER = LogClock([], [0])  # clock that was not set back
 
 
 class Part(NamedTuple):
@@ -199,17 +202,16 @@ class SessionFile(ABC):
         return "/".join([parts[0], "msg", parts[1]] if len(parts) == 2 else parts)
 
     @abstractmethod
-    def messages(self) -> Iterator[tuple[int, int, bytes]]:
-        """Yield channel, log time (ns) and encoded data of all messages."""
+    def messages(self, clock: LogClock = IN_ORDER) -> Iterator[tuple[int, int, bytes]]:
+        """Yield channel, log time (ns) and encoded data of all messages.
+
+        A storage that has no `parts` of its own yields them in the order of log times by the `clock`.
+        """
 
     @cached_property
     def log_clock(self) -> LogClock:
         """Clock of log times. The default is for a storage whose order is that of log times."""
-        return LogClock([], [0])
-
-    def messages_by(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
-        """Yield messages as `messages` does, in the order of log times by the `clock`."""
-        return self.messages()
+        return IN_ORDER
 
     def parts(self, passed: Set[int], clock: LogClock) -> Iterator[Part]:
         """Yield all messages, except of the `passed` channels, by ascending bounds, with log times by the `clock`.
@@ -217,7 +219,7 @@ class SessionFile(ABC):
         `sources` of a block holds channel numbers.
         """
         together = 2000  # messages in one block of a file that is read message by message
-        found = (each for each in self.messages_by(clock) if each[0] not in passed)
+        found = (each for each in self.messages(clock) if each[0] not in passed)
         for number, group in enumerate(iter(lambda: list(islice(found, together)), [])):
             sources, times, data = zip(*group, strict=True)
             ends = np.cumsum([len(each) for each in data])

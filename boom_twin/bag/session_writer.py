@@ -6,7 +6,6 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
-from functools import cache
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -70,17 +69,12 @@ def samples_in_rows(
 def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
     """Return the message that a rig's sensor sends, with the usual names. An Imu has the `rate` (1,) too, if given."""
     kind = SENSORS[sample.stream]
-    names = _usual_names(sample.stream, len(sample.values) // (len(kind.ends) or 1))
+    names = [usual(channel)["name"] for channel in kind.channels(len(sample.values) // (len(kind.ends) or 1))]
     readings = -sample.values if kind.beside else sample.values  # a gyro turns about the axis to the right, see `factor`
     msg = named_message(Sample(sample.stream, sample.stamp, readings), names)
     if rate is not None:
         msg.angular_velocity.y, msg.angular_velocity_covariance[0] = -float(rate[0]), 0.0
     return msg
-
-
-@cache
-def _usual_names(stream: Stream, joints: int) -> list[str]:
-    return [usual(channel)["name"] for channel in SENSORS[stream].channels(joints)]
 
 
 def named_message(sample: Sample, names: Sequence[str]) -> Any:

@@ -21,10 +21,12 @@ if TYPE_CHECKING:
     from ..scene.schema import Joint
 
 
-class SensorPlace(BaseModel):
-    """Place of a sensor on the boom; see `boom_twin.types.Place`."""
-
+class _Entry(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class SensorPlace(_Entry):
+    """Place of a sensor on the boom; see `boom_twin.types.Place`."""
 
     section: Annotated[int, Field(ge=1)] | None = None
     at: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
@@ -35,10 +37,8 @@ class SensorPlace(BaseModel):
         return Place(self.section, self.at, self.turned)
 
 
-class Sensor(BaseModel):
+class Sensor(_Entry):
     """Sensor of one channel: quantity = sign * scale * (reading - zero), in `unit`. ``topics.yaml`` explains the keys."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: Annotated[str, Field(min_length=1, max_length=200)]
     unit: str
@@ -98,10 +98,6 @@ class Output(StrEnum):
     ESTIMATE_LOAD = "estimate_load"
     ESTIMATE_MODES = "estimate_modes"
     DIAGNOSTICS = "diagnostics"
-
-
-class _Entry(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Qos(_Entry):

@@ -85,18 +85,15 @@ class SessionTotals:
         angles, predictions = stretch.residuals_of(Stream.ANGLES), stretch.predictions
         self.residuals.add(angles.values)
         self.normalised.add(angles.normalised)
-        for health in stretch.health:
-            self._add_tip_sigmas(health.tip_sigmas)
+        for sigmas in (health.tip_sigmas for health in stretch.health):
+            self.tip_sigmas = np.fmax(self.tip_sigmas, sigmas)
+            if np.isfinite(sigmas).all():
+                self.tip_sigma = max(self.tip_sigma or 0.0, float(np.hypot(*sigmas)))
         if not len(predictions.stamps):
             return
         self.samples += len(predictions.stamps)
         self.load.add(predictions.stamps, stretch.estimates.load, stretch.estimates.load_variance)
         self.acceleration = float(np.fmax(self.acceleration, np.hypot(*predictions.tip_acceleration.T).max()))
-
-    def _add_tip_sigmas(self, sigmas: Array) -> None:
-        self.tip_sigmas = np.fmax(self.tip_sigmas, sigmas)
-        if np.isfinite(sigmas).all():
-            self.tip_sigma = max(self.tip_sigma or 0.0, float(np.hypot(*sigmas)))
 
 
 class ReadOut:

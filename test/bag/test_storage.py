@@ -164,6 +164,7 @@ def test_a_disk_that_never_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPat
             storage.check()
     with pytest.raises(BagError, match="does not keep up: it has not answered"):
         storage.close()
+    monkeypatch.setattr(module, "PATIENCE", 60.0)
     answers.set()
     storage.close()
 
