@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import BoomTwinError, UsageError
 from ..monitor import ACTS, PORT
+from ..system.processes import LESS_URGENT
 from .arguments import add_ros_args, add_session, ros_arguments, window_of
 from .output import open_scene, open_session_scene, open_session_settings, tell, warn_incomplete
 
@@ -59,7 +60,7 @@ def run(args: Namespace) -> int:
 
 def _lower_priority() -> None:
     """Lower this process's priority, so that the node on the same machine runs first and is not interrupted within a step."""
-    os.nice(5)
+    os.nice(LESS_URGENT)
     if hasattr(os, "SCHED_BATCH"):  # Linux: does not preempt others when it wakes up
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 

@@ -17,10 +17,11 @@ from ..predictions import Estimate, Prediction
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
 from .levels import Bounds, ComponentJudge, Level, Status, Value
-from .row_buffer import StampWindow
+from .sensor_status import RowBuffer
 
 FAILURE_SHOWN = 1.0  # time (s) for which a failure is shown
 LOAD_WINDOW = 40 * SECOND  # ns, window of loads at the tip
+INTERVAL = SECOND // 50  # ns, least time between two rows of a window
 SWING_WINDOW = 4 * SECOND  # ns, window of displacements of the tip: four periods of a slow boom
 
 
@@ -114,6 +115,24 @@ class ModelWatch:
         if steps:
             self._predicted_at = now
         self._looked, self._steps, self._busy, self._longest = now, 0, 0.0, 0.0
+
+
+class StampWindow(RowBuffer):
+    """Rows of the last `window` (ns) by their stamps, at most one in every `INTERVAL`."""
+
+    def __init__(self, window: int, width: int) -> None:
+        super().__init__(width)
+        self._window, self._newest = window, -INTERVAL
+
+    def is_due(self, stamp: int) -> bool:
+        """Return True if no row was added within the `INTERVAL` before `stamp` (ns)."""
+        return not 0 <= stamp - self._newest < INTERVAL
+
+    def add(self, stamp: int, row: Array) -> None:
+        """Add a row that `is_due`; forget all if the clock was set back."""
+        is_back, self._newest = stamp < self._newest, stamp
+        self.forget(len(self.stamps) if is_back else int(np.searchsorted(self.stamps, stamp - self._window)))
+        super().add(stamp, row)
 
 
 class SwingWatch:

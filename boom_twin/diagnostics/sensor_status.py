@@ -17,7 +17,6 @@ from ..scene.schema import Scene
 from ..texts import alarm_text
 from ..types import NANO, SENSORS, Array, Mount, Sample, Stream
 from .levels import Bounds, ComponentJudge, Status
-from .row_buffer import RowBuffer
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +71,34 @@ class Channel:
             unchanged=self._unchanged,
             step=self._step,
         )
+
+
+class RowBuffer:
+    """Rows of `width` numbers with stamps (ns), in the order of arrival: to make an array of a list of rows takes 1 ms."""
+
+    def __init__(self, width: int) -> None:
+        self._stamps, self._rows, self._kept = np.empty(0, np.int64), np.empty((0, width)), slice(0, 0)
+
+    @property
+    def stamps(self) -> NDArray[np.int64]:
+        return self._stamps[self._kept]
+
+    @property
+    def rows(self) -> Array:
+        return self._rows[self._kept]
+
+    def add(self, stamp: int, row: Array) -> None:
+        if self._kept.stop == len(self._stamps):
+            count, (_, width) = len(self.stamps), self._rows.shape
+            size = max(64, 2 * count)
+            self._stamps, self._rows = np.resize(self.stamps, size), np.resize(self.rows, (size, width))
+            self._kept = slice(0, count)
+        self._stamps[self._kept.stop], self._rows[self._kept.stop] = stamp, row
+        self._kept = slice(self._kept.start, self._kept.stop + 1)
+
+    def forget(self, count: int) -> None:
+        """Forget the oldest rows."""
+        self._kept = slice(self._kept.start + count, self._kept.stop)
 
 
 class StreamWatch:

@@ -12,8 +12,7 @@ from ..config.settings import Thresholds
 from ..types import SENSORS, Health, Report, Sample, Stream
 from .levels import ComponentJudge, Evaluation, Level, Status, Value
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, SwingWatch, stress_status
-from .row_buffer import RowBuffer
-from .sensor_status import SensorSpec, StreamWatch, sensor_status
+from .sensor_status import RowBuffer, SensorSpec, StreamWatch, sensor_status
 from .topic_status import Peers, Reception, ReceptionWatch, outputs_status, publishers_status, seconds, topic_status
 
 

@@ -13,9 +13,7 @@ from contextlib import suppress
 from typing import Any
 
 from ..errors import BoomTwinError
-from .processes import python_command
-
-LESS_URGENT = 15  # added niceness of the child: beside a process that never waits it has 36 / (36 + 1024) of a core
+from .processes import LESS_URGENT, python_command
 
 
 class ChildEndedError(BoomTwinError):

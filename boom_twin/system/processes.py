@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from subprocess import Popen
 
 
+LESS_URGENT = 15  # added niceness beside a live node: 36 / (36 + 1024) of a core that another process would use alone
 ROOT = Path(__file__).absolute().parents[2]  # folder or zip archive from which this process imported ``boom_twin``
 
 _START = (

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from boom_twin.diagnostics.row_buffer import INTERVAL, RowBuffer, StampWindow
+from boom_twin.diagnostics.model_status import INTERVAL, StampWindow
+from boom_twin.diagnostics.sensor_status import RowBuffer
 
 
 def test_rows_keep_their_order_beyond_any_room() -> None:

@@ -32,6 +32,11 @@ def test_a_child_that_ends_is_an_error():
             leave(3)
 
 
+def test_a_child_gives_way_to_its_parent():
+    """Beside a parent that never waits, less than a twentieth of a core is a child's."""
+    assert ChildCall(partial, os.nice)(0) >= min(os.nice(0) + 14, 19)
+
+
 def test_closing_ends_a_child_that_works():
     """A call that lasts ends with an error when another thread closes the child; later calls are errors too."""
     wait = ChildCall(partial, sleep)
