@@ -92,27 +92,14 @@ def most_repeats(sensors, i):
 
 @inner
 def readings_of_frozen(sigma, resolution, false_alarm):
-    """Return the number of equal readings in a row that white noise gives with a probability below `false_alarm`.
+    """Return the number of equal readings in a row that white noise gives with a probability below `false_alarm` each.
 
-    Noise of standard deviation s, `QUIET` of what is stated, repeats a reading in steps of q with a probability of at most
+    Noise of standard deviation s, `QUIET` of the stated `sigma`, repeats a reading in steps of q with a probability of at most
 
         p = erf(q / (2 sqrt(2) s)),
 
-    reached by a sensor that stands still in the middle of a step; N equal readings have p^(N - 1). A sensor that is coarse
-    against its noise needs many (q = 7 s: 4e4; q = 10 s: 4e7, for a probability of 1e-9); one without noise cannot be told
-    from a frozen one.
-
-    Parameters
-    ----------
-    sigma, resolution : float
-        Of the sensor, in its unit: as stated; as stated or shown, whichever is coarser.
-    false_alarm : float
-        Probability for each reading.
-
-    Returns
-    -------
-    float
-        N >= 2; infinite without noise.
+    reached by a sensor that stands still in the middle of a step. N equal readings have p^(N - 1). The number is at least 2. It
+    is infinite where a sensor at rest cannot be told from a frozen one: one without noise, or coarse against it.
     """
     if sigma == 0.0:
         return math.inf

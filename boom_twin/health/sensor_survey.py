@@ -180,7 +180,7 @@ def go_on(sensors, times, raw, left, share):
                 known += 1
             if math.isnan(raw[t, i]):
                 lacking += 1
-            elif raw[t, i] < sensors.low[i] or raw[t, i] > sensors.high[i]:
+            elif is_outside(sensors, raw[t, i], i) and not is_outside(sensors, raw[t, i] - left[t, i], i):
                 outside[i] += 1.0
             if raw[t, i] == raw[t - 1, i]:
                 run[i] += 1
@@ -203,6 +203,12 @@ def go_on(sensors, times, raw, left, share):
             else:
                 power[i] += share * (heard - power[i])
     return largest
+
+
+@inner
+def is_outside(sensors, reading, i):
+    """Return True if a reading of channel i is out of its range. Where one is expected there, the range is wrong."""
+    return reading < sensors.low[i] or reading > sensors.high[i]
 
 
 @kernel

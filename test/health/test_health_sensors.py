@@ -82,6 +82,19 @@ def test_a_read_out_that_is_coarser_than_stated_gives_nothing(sigma, resolution)
     assert stream.found(1200, motion=lambda times: np.zeros_like(times), change=lambda _, raw: stream.rounded(rests)) == {}
 
 
+@pytest.mark.parametrize(("expects", "kinds"), [(0.0, {"range"}), (1.5, set())])
+def test_a_reading_out_of_range_where_the_model_is_too_shows_a_wrong_range(expects, kinds):
+    """Readings are 1.5 of a range that ends at 1."""
+    stream = started(5)
+
+    def change(times, raw):
+        raw[:, 3] += 1.5 - expects
+        return raw
+
+    found = stream.found(10, change=change, motion=lambda times: np.full_like(times, expects))
+    assert {kind for kind, _ in found} - {"jump"} == kinds
+
+
 def test_stuck():
     stream, last = started(1), []
 
