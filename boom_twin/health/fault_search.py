@@ -252,7 +252,8 @@ class FaultSearch:
 
         Twins of larger and smaller sizes follow the recent seconds until the likelihood falls on both sides. The deviation is
         that of the sizes without each of these seconds (jackknife), also where the model is inexact. None if the size is not
-        surely larger than the largest that a healthy boom seems to have, or a force's below the set deviation.
+        surely larger than the largest that a healthy boom seems to have, or a force's below the set deviation; or if half of it
+        is not likelier than none: the likelihood of a fault rises up to its size, a twin that opens another valve may jump.
         """
         usual = usual_size(self._scene, fault, self._settings.scene_error)
         if fault.kind == "off":
@@ -285,8 +286,8 @@ class FaultSearch:
         with np.errstate(divide="ignore", invalid="ignore"):  # nothing is left without the only second
             without = 0.5 * np.diff(slopes + 2.0 * curves * change, append=0.0) / (curves[0] + np.diff(curves, append=0.0))
         sized, spread = fault._replace(size=sizes[best] + change), math.hypot(float(np.linalg.norm(without)), usual)
-        found = sized, spread, onset + first * SECOND, float(gains[best][first])
-        return found if sized.size > self._certain * spread else None
+        is_likely = sized.size > self._certain * spread and TEMPER * gained(0.5 * sized.size)[first] > self._sure
+        return (sized, spread, onset + first * SECOND, float(gains[best][first])) if is_likely else None
 
     def _course(self, fault: Fault, onset: int) -> Array:
         """Return the log likelihood of each recent second since the onset; `IMPOSSIBLE` for an impossible boom."""

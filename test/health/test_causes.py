@@ -198,6 +198,17 @@ def test_of_two_loads_the_likelier_one_at_its_own_size_is_named():
     assert [alarm.cause for alarm in taken(FaultTwins(load_scene(), made, SETTINGS), 60)][:1] == ["line_fill"]
 
 
+@pytest.mark.parametrize(("below", "named"), [(2.0, ["cylinder_2.k"]), (-2.0, [])])
+def test_a_cause_whose_half_is_unlikely_is_not_named(below, named):
+    """A spring 30 % softer explains all seconds; one up to 20 % softer gains or loses 2 nats a second."""
+
+    def made(each):
+        lost = spring_of(each)
+        return Follower(lambda _: 8.0 - 200.0 * (lost - 0.3) ** 2 if lost > 0.2 else below * (lost > 0.01))
+
+    assert [alarm.cause for alarm in taken(FaultTwins(load_scene(), made, SETTINGS), 40)] == named
+
+
 def test_a_cause_that_helps_at_any_size_is_not_named():
     """A boom as believed that has lost the motion is no evidence for a fault that helps with 2 % as much as with 25 %."""
     twins = FaultTwins(load_scene(), lambda each: Follower(lambda _: 50.0 * (spring_of(each) > 0.01)), SETTINGS)
