@@ -183,9 +183,9 @@ class Evidence:
             return None
         shown = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])[:3]
         shown.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in shown))))
-        likely = {cause for cause, _ in shown} - {self._faults[best].cause}
-        sized = [i for i, fault in enumerate(self._faults) if fault.cause in likely and fault.is_told and fault.kind != "off"]
-        rivals = tuple(i for i in sized if evidence[i] > 0.0 and self._faults[best].kind != "off")
+        others = {cause for cause, _ in shown if self._faults[best].kind != "off"} - {self._faults[best].cause}
+        sized = [i for i, fault in enumerate(self._faults) if fault.cause in others and fault.is_told and fault.kind != "off"]
+        rivals = tuple(i for i in sized if evidence[i] > 0.0)
         return Verdict(best, rivals, self._stamps[min(int(onsets[best]) + 1, len(self._stamps) - 1)], tuple(shown))
 
     def discard(self, place: int) -> None:

@@ -206,8 +206,7 @@ class FaultSearch:
         """Name the fault of a verdict, or end it if it is named; return its alarm.
 
         A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show. One whose
-        joint has a sensor that is off is not: its stroke transducer may be that, and k is known by what this reads. Other
-        likely causes, each at its own most likely size, must be less likely by the odds of a name.
+        joint has a sensor that is off is not: that may be its stroke transducer. Rivals have their own most likely sizes.
         """
         fault, begin = self._faults[verdict.place], verdict.onset
         if fault in self._named:
@@ -251,9 +250,9 @@ class FaultSearch:
         """Return a fault of the most likely size, its deviation, its onset, not before `onset` (ns), and its gain since then.
 
         Twins of larger and smaller sizes follow the recent seconds until the likelihood falls on both sides. The deviation is
-        that of the sizes without each of these seconds (jackknife), also where the model is inexact. None if the size is not
-        surely larger than the largest that a healthy boom seems to have, or a force's below the set deviation; or if half of it
-        is not likelier than none: the likelihood of a fault rises up to its size, a twin that opens another valve may jump.
+        that of the sizes without each second (jackknife), also where the model is inexact. None if the size is not surely above
+        that of healthy booms, if a force's is below the set deviation, or if half the size is not likelier than none: the
+        likelihood of a fault rises up to its size; a twin that opens another valve may jump.
         """
         usual = usual_size(self._scene, fault, self._settings.scene_error)
         if fault.kind == "off":
