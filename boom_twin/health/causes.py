@@ -2,16 +2,14 @@
 
 Every second gives each hypothesis a gain: its log likelihood less that of the boom as believed. The evidence of a hypothesis is
 the largest sum of its gains up to now, over all possible onsets.
-A cause is named if its posterior probability is high. Four facts limit that.
+A cause is named if its posterior probability is high. Three facts limit that.
 
 - Successive innovations are not independent. So likelihoods are raised to the power `TEMPER`.
-- An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. In each
-  second no log likelihood counts as more than `MOST_GAIN` below the best.
-- Such effects favour now one cause, now another. So the mean gain since the onset must be surely above zero by its own
-  scatter, for all onsets and causes together (Q. Vuong, Econometrica 57 (1989), 307-333, with the bound of Bonferroni).
+- An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. In each second no log
+  likelihood counts as more than `MOST_GAIN` below the best.
 - Parameters of a healthy boom are wrong by `Settings.scene_error`. So its likelihood is that of the boom as believed, and
-  what these errors are expected to cost that. A fault is named only if its size is likelier than one that these errors make
-  appear.
+  what these errors are expected to cost that. Each fault then seems to have a size. So a name needs a size surely above zero
+  by these errors and by its scatter, for all faults together (bound of Bonferroni).
 """
 
 from __future__ import annotations
@@ -19,7 +17,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
@@ -38,7 +35,6 @@ LATE = 0.02  # s, delay of the stamps of a stream
 TEMPER = math.log(20.0) / 25.0  # power of likelihoods: 25 nats more make a cause 20 times as probable
 MOST_GAIN = 12.0  # nats by which the likelihood of a second is below the best, at most
 MEMORY = 60  # s of gains that are kept
-CAME_BACK = 0.3  # remaining share of the change of a sensor's zero, or of its jump, below which that has ended
 
 
 class Fault(NamedTuple):
@@ -133,11 +129,13 @@ def usual_size(scene: Scene, fault: Fault, error: float) -> float:
 class Verdict(NamedTuple):
     """Named fault.
 
-    place : index among the faults compared. onset : stamp (ns) of the first second of its evidence. ranked : the three
-    most probable causes with their posterior probabilities, then `UNKNOWN` with the rest.
+    place : index among the faults compared. rivals : of the other causes that are ranked and have a size; none of a sensor.
+    onset : stamp (ns) of the first second of its evidence. ranked : the three most probable causes with their posterior
+    probabilities, then `UNKNOWN` with the rest.
     """
 
     place: int
+    rivals: tuple[int, ...]
     onset: int
     ranked: tuple[tuple[str, float], ...]
 
@@ -181,13 +179,14 @@ class Evidence:
         weights = np.exp(TEMPER * (np.array(list(causes.values())) - max(causes.values())))
         chances = dict(zip(causes, (weights / weights.sum()).tolist(), strict=True))
         best = int(np.argmax(evidence))
-        grown = np.diff(gains[onsets[best] :, best])
-        sure = NormalDist().inv_cdf(1.0 - (1.0 - self._odds) / rises.size)
-        if chances[self._faults[best].cause] < self._odds or grown.sum() < sure * grown.std() * math.sqrt(len(grown)):
+        if chances[self._faults[best].cause] < self._odds:
             return None
         shown = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])[:3]
         shown.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in shown))))
-        return Verdict(best, self._stamps[min(int(onsets[best]) + 1, len(self._stamps) - 1)], tuple(shown))
+        others = {cause for cause, _ in shown if self._faults[best].kind != "off"} - {self._faults[best].cause}
+        sized = [i for i, fault in enumerate(self._faults) if fault.cause in others and fault.is_told and fault.kind != "off"]
+        rivals = tuple(i for i in sized if evidence[i] > 0.0)
+        return Verdict(best, rivals, self._stamps[min(int(onsets[best]) + 1, len(self._stamps) - 1)], tuple(shown))
 
     def discard(self, place: int) -> None:
         """Discard the evidence of one fault up to now, because its size is none that is named; others keep theirs."""

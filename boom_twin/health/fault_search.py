@@ -22,9 +22,9 @@ from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
-from .causes import CAME_BACK, MEMORY, TEMPER, Evidence, Fault, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
+from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, evidence_of, hypothesis, possible_faults, usual_size
 from .creep import SPAN, CreepMonitor
-from .sensor_check import Flags
+from .sensor_check import CAME_BACK, Flags
 
 RATIO = 1.4  # of successive trial sizes of a named fault
 IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
@@ -94,6 +94,7 @@ class FaultSearch:
         threads: int = 1,  # among which the twins are shared
     ) -> None:
         self._scene, self._make, self._settings, self._reads = scene, make, settings, reads
+        self._sure = math.log(settings.name_odds / (1.0 - settings.name_odds))
         self._cores = ThreadPoolExecutor(threads, "fault twins")  # twins do not depend on each other
         self._recent: deque[Second] = deque(maxlen=MEMORY)
         self._change: Change | None = None
@@ -199,15 +200,15 @@ class FaultSearch:
         if (fault := self._back_again()) is not None:
             return self._ended(fault, stamp)
         verdict = self._decision.take(stamp, grown)
-        return [] if verdict is None else self._name(*verdict, stamp)
+        return [] if verdict is None else self._name(verdict, stamp)
 
-    def _name(self, place: int, begin: int, chances: Sequence[tuple[str, float]], stamp: int) -> list[Alarm]:
-        """Name the fault of a verdict (see `Verdict`), or end it if it is named; return its alarm.
+    def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
+        """Name the fault of a verdict, or end it if it is named; return its alarm.
 
         A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show. One whose
-        joint has a sensor that is off is not: its stroke transducer may be that, and k is known by what this reads.
+        joint has a sensor that is off is not: that may be its stroke transducer. Rivals have their own most likely sizes.
         """
-        fault = self._faults[place]
+        fault, begin = self._faults[verdict.place], verdict.onset
         if fault in self._named:
             return self._ended(fault, begin)
         if fault.cause.startswith("cylinder_") and fault.kind == "softer":
@@ -215,16 +216,18 @@ class FaultSearch:
             is_off = any(each.cause == f"joint_{number}.sensor" for each in self._named)
             if is_off or number - 1 in self._creep.creeping or stamp - begin < SPAN * SECOND:
                 return []
-        if (found := self._sized(fault, begin)) is None:
-            self._decision.discard(place)
+        found = self._sized(fault, begin)
+        others = [self._sized(self._faults[each], begin) for each in verdict.rivals if found is not None]
+        if found is None or any(each is not None and TEMPER * (found[3] - each[3]) < self._sure for each in others):
+            self._decision.discard(verdict.place)
             return []
-        sized, spread, onset = found
+        sized, spread, onset, _ = found
         if fault.kind == "off" and abs(sized.size) < self._certain * spread:  # its zero still drifts
             return []
-        ranked = tuple(Ranked(cause, chance, ()) for cause, chance in chances)
+        ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
         evidence = evidence_of(sized, spread) if fault.is_told else ""
         alarm = self._named[sized] = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
-        self._believe(fault, place + 1)
+        self._believe(fault, verdict.place + 1)
         return [alarm] if fault.is_told else []
 
     def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
@@ -243,22 +246,22 @@ class FaultSearch:
                     return fault
         return None
 
-    def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float, int] | None:
-        """Return a fault of the most likely size, its standard deviation, and its most likely onset, not before `onset` (ns).
+    def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float, int, float] | None:
+        """Return a fault of the most likely size, its deviation, its onset, not before `onset` (ns), and its gain since then.
 
-        Twins of larger and smaller sizes follow the recent seconds until the likelihood falls on both sides. None if the
-        size is not surely larger than the largest that a healthy boom seems to have, or a force's below the set deviation.
+        Twins of larger and smaller sizes follow the recent seconds until the likelihood falls on both sides. The deviation is
+        that of the sizes without each second (jackknife), also where the model is inexact. None if the size is not surely above
+        that of healthy booms, if a force's is below the set deviation, or if half the size is not likelier than none: the
+        likelihood of a fault rises up to its size; a twin that opens another valve may jump.
         """
-        odds = self._settings.name_odds
-        sure, usual = math.log(odds / (1.0 - odds)), usual_size(self._scene, fault, self._settings.scene_error)
+        usual = usual_size(self._scene, fault, self._settings.scene_error)
         if fault.kind == "off":
             changed, spread, drift = self._change_of_zero(fault, onset)
             spread = math.hypot(spread, usual)
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
             is_known = abs(changed.size) > max(least, self._certain * spread)
-            return (changed, math.hypot(spread, drift), onset) if is_known else None
-        least = self._certain * usual
-        healthy = self._course(fault._replace(size=least), onset)
+            return (changed, math.hypot(spread, drift), onset, 0.0) if is_known else None
+        healthy = self._course(fault._replace(size=0.0), onset)
 
         def gained(size: float) -> Array:
             """Return the gain of a size by onset: the sum of those of the seconds from there."""
@@ -270,17 +273,20 @@ class FaultSearch:
         while gains[-1].max() > gains[-2].max():
             sizes.append(RATIO * sizes[-1])
             gains.append(gained(sizes[-1]))
-        while gains[0].max() > gains[1].max() and sizes[0] > least:
+        while gains[0].max() > gains[1].max() and sizes[0] > self._certain * usual:
             sizes.insert(0, sizes[0] / RATIO)
             gains.insert(0, gained(sizes[0]))
         best = int(np.argmax([each.max() for each in gains]))
-        if best == 0 or TEMPER * gains[best].max() < sure:
+        if best == 0:
             return None
-        first, ratios = int(gains[best].argmax()), np.array(sizes[best - 1 : best + 2]) / sizes[best]
-        curve, slope, _ = np.polyfit(ratios - 1.0, [each[first] for each in gains[best - 1 : best + 2]], 2)
-        shift, spread = np.clip(-0.5 * slope / curve, ratios[0] - 1.0, ratios[2] - 1.0), (-2.0 * TEMPER * curve) ** -0.5
-        sized = fault._replace(size=float(sizes[best] * (1.0 + shift)))
-        return sized, math.hypot(sizes[best] * spread, usual), onset + first * SECOND
+        first, changes = int(gains[best].argmax()), np.array(sizes[best - 1 : best + 2]) - sizes[best]
+        curves, slopes, _ = np.polyfit(changes, [each[first:] for each in gains[best - 1 : best + 2]], 2)
+        change = float(np.clip(-0.5 * slopes[0] / curves[0], changes[0], changes[2]))
+        with np.errstate(divide="ignore", invalid="ignore"):  # nothing is left without the only second
+            without = 0.5 * np.diff(slopes + 2.0 * curves * change, append=0.0) / (curves[0] + np.diff(curves, append=0.0))
+        sized, spread = fault._replace(size=sizes[best] + change), math.hypot(float(np.linalg.norm(without)), usual)
+        is_likely = sized.size > self._certain * spread and TEMPER * gained(0.5 * sized.size)[first] > self._sure
+        return (sized, spread, onset + first * SECOND, float(gains[best][first])) if is_likely else None
 
     def _course(self, fault: Fault, onset: int) -> Array:
         """Return the log likelihood of each recent second since the onset; `IMPOSSIBLE` for an impossible boom."""

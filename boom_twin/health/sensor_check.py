@@ -23,6 +23,7 @@ JERK = 3.0  # m/s^3 of a cylinder in haste, which is no noise of its sensor: 0.2
 NOISE_OVER = "noise_over_"  # and the name of a setting: how its figures are called
 MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
 WINDOW = 2.0  # s, time constant of the slow means
+CAME_BACK = 0.3  # remaining share of the change of a sensor's zero, or of its jump, below which that has ended
 ENOUGH = 0.6  # weight of slow means that are judged: after 1.8 s
 
 

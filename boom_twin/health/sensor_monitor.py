@@ -14,8 +14,8 @@ import numpy as np
 
 from ..types import NANO, SECOND, SENSORS, Alarm, Array, Stream
 from .alarms import change_text
-from .causes import CAME_BACK, MEMORY
-from .sensor_check import MISSTATED, NOISE_OVER, WINDOW, Flags, SensorFindings
+from .causes import MEMORY
+from .sensor_check import CAME_BACK, MISSTATED, NOISE_OVER, WINDOW, Flags, SensorFindings
 from .sensor_survey import MEASURED
 
 SETTLED = round(WINDOW / NANO)  # ns without the fault after which it has ended
