@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Set
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from io import BytesIO
@@ -17,9 +18,10 @@ from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.records import Chunk, ChunkIndex, Statistics
 from mcap.summary import Summary
+from numpy.typing import NDArray
 
 from ..errors import BagError
-from ..messages.cdr_decoder import MessageBlock, by_log_time, gather
+from ..messages.cdr_decoder import Integers, MessageBlock, by_log_time, gather
 from ..system.received_files import open_received
 from .mcap_records import (
     HEADS,
@@ -34,7 +36,18 @@ from .mcap_records import (
     unpack,
 )
 from .scanner import DamagedBytes, definitions_of, scan_records
-from .session_file import IN_ORDER, MOST_HELD, PIECE, LogClock, Part, SessionFile, as_bag_error, by_topic, compare_counts
+from .session_file import (
+    IN_ORDER,
+    MOST_HELD,
+    PARSE_ERRORS,
+    PIECE,
+    LogClock,
+    Part,
+    SessionFile,
+    as_bag_error,
+    by_topic,
+    compare_counts,
+)
 
 _CRC = PREFIX.size + 24  # offset of the checksum in the record of a chunk
 _MESSAGE = int(Opcode.MESSAGE)
@@ -67,10 +80,16 @@ class McapFile(SessionFile):
 
     @cached_property
     def log_clock(self) -> LogClock:
-        """Clock as in `SessionFile`, from all messages."""
-        with as_bag_error(self.path), open_received(self.path) as file:
-            blocks = (_messages(_content(file, piece)) for piece in self.pieces)
-            return LogClock.of(((block.sources, block.log_times) for block in blocks), self.counts)
+        """Clock as in `SessionFile`, from the messages up to the first damage, which their reader reports."""
+
+        def pieces() -> Iterator[tuple[Integers, NDArray[np.uint64]]]:
+            with suppress(*PARSE_ERRORS), open_received(self.path) as file:
+                for piece in self.pieces:
+                    block = _messages(_content(file, piece))
+                    yield block.sources, block.log_times
+
+        with as_bag_error(self.path):
+            return LogClock.of(pieces(), self.counts)
 
     def parts(self, passed: Set[int], clock: LogClock) -> Iterator[Part]:
         """Yield parts as in `SessionFile`, one for each piece. If the clock was set back, the order is that of the file."""
