@@ -43,6 +43,7 @@ _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
 _CHUNK_HEAD = struct.Struct("<BQQQQII")
 _SIZE = struct.Struct("<Q")
 _MESSAGE = bytes([Opcode.MESSAGE])
+PRIVATE = 0x80  # first opcode of records that applications define for themselves
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +83,9 @@ def scan_records(path: Path, channels: Container[int] = ()) -> Iterator[SoundRec
             elif records := _whole_records(file, offset, size):
                 after = offset + len(records)
                 yield SoundRecords(offset, len(records), records)
+            elif length := _private_length(file, offset, size):
+                after = offset + length
+                yield SoundRecords(offset, length, b"")
             else:
                 after = _behind(file, offset + 1, size, channels)
                 yield DamagedBytes(offset, after - offset, "no record that is whole begins here")
@@ -163,6 +167,14 @@ def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:
     return record
 
 
+def _private_length(file: BinaryIO, offset: int, size: int) -> int:
+    """Return the bytes of the record at `offset` if it is an application's own, which the format lets readers skip; else 0."""
+    file.seek(offset)
+    opcode, length = PREFIX.unpack(file.read(PREFIX.size).ljust(PREFIX.size, b"\0"))
+    end = offset + PREFIX.size + length
+    return PREFIX.size + length if opcode >= PRIVATE and end <= size and _may_begin(file, end, size) else 0
+
+
 def _may_begin(file: BinaryIO, offset: int, size: int) -> bool:
     """Return True if a record, a part of one, or the end of the file may be at `offset`."""
     file.seek(offset)
@@ -170,7 +182,7 @@ def _may_begin(file: BinaryIO, offset: int, size: int) -> bool:
     if len(raw) < PREFIX.size:
         return raw[:1] in (b"", MCAP0_MAGIC[:1]) or raw[0] in {Opcode.MESSAGE, *KINDS}
     opcode, length = PREFIX.unpack(raw)
-    return opcode in (Opcode.MESSAGE, Opcode.CHUNK, *KINDS) and length <= MOST_HELD
+    return (opcode >= PRIVATE or opcode in (Opcode.MESSAGE, Opcode.CHUNK, *KINDS)) and length <= MOST_HELD
 
 
 def _ends(file: BinaryIO, offset: int) -> bool:

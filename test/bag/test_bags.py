@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from mcap.writer import IndexType
+from mcap.writer import MCAP0_MAGIC, IndexType
 from recordings import FILE_NAME, MessageWriter, Session, read, read_metadata, recover, scan, write_metadata, write_session
 from ros_messages import Qos, Topic, jazzy, load_topics, new_message, stamp_of
 from rosbags.highlevel import AnyReader
@@ -181,6 +181,19 @@ def test_files_that_lack_something_are_read_fully(
     assert [(each.count, each.gap) for each in inspect(path).tallies] == [
         (each.count, each.gap) for each in inspect(bag).tallies
     ]
+
+
+@pytest.mark.parametrize("is_chunked", [False, True])
+def test_records_that_an_application_defined_for_itself_are_skipped(
+    bag: Path, rewritten: Callable[..., Path], is_chunked: bool, content: Content
+) -> None:
+    """Behind the header, before the first chunk or schema: opcode 0x80, 5 bytes."""
+    path = rewritten(bag, **LACKING["no summary"], use_chunking=is_chunked)
+    (file,) = path.glob("*.mcap") if path.is_dir() else (path,)
+    raw = file.read_bytes()
+    behind = len(MCAP0_MAGIC) + 9 + int.from_bytes(raw[len(MCAP0_MAGIC) + 1 :][:8], "little")
+    file.write_bytes(raw[:behind] + b"\x80" + (5).to_bytes(8, "little") + b"\xff" * 5 + raw[behind:])
+    assert content(scan(path)) == content(scan(bag))
 
 
 @pytest.mark.parametrize("options", [{}, {"use_chunking": False}], ids=["indexed", "unindexed"])
