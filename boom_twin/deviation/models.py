@@ -180,7 +180,7 @@ def states_of(p, mixture):
 def hold_still(p, f, k, is_open, size):
     """Correct model `k` by readings of zero rate and acceleration of drives behind closed valves."""
     n, drive, count, gains, width = p.drives.shape[0], drive_place(p), 0, f.gains[0], whole(size)
-    keep_unread(p, f, k, False)
+    keep_unread(p, f, k)
     for i in range(n):
         if is_open[i] == 0 and not f.deaf[i]:
             for order in (1, 2):
@@ -193,7 +193,7 @@ def hold_still(p, f, k, is_open, size):
                 expected = gain[at] + noise * noise
                 count = take_innovation(f.x[k], f.p[k], gains, count, -f.x[k, at], expected, size)
     take_gains(f.p[k], gains, count, size)
-    keep_unread(p, f, k, True)
+    restore_unread(p, f, k)
 
 
 @inner
@@ -222,7 +222,7 @@ def drive_noise2(p, f, i):
 def take_lengths(p, f, k, size, y):
     """Correct model `k` by readings `y` (n; NaN = missing); return their log likelihood."""
     total, count, gains = 0.0, 0, f.gains[0]
-    keep_unread(p, f, k, False)
+    keep_unread(p, f, k)
     for i in range(y.shape[0]):
         if math.isfinite(y[i]) and not f.deaf[i]:
             innovation = y[i] - f.offsets[i] - read(f.driving[i], f.x[k], size)
@@ -230,32 +230,36 @@ def take_lengths(p, f, k, size, y):
             count = take_innovation(f.x[k], f.p[k], gains, count, innovation, expected, size)
             total -= 0.5 * (innovation * innovation / expected + math.log(expected))
     take_gains(f.p[k], gains, count, size)
-    keep_unread(p, f, k, True)
+    restore_unread(p, f, k)
     return total
 
 
 @inner
-def keep_unread(p, f, k, restore):
-    """Keep, or restore, what model `k` knows of drives whose transducers are left out, while it takes the other lengths.
+def keep_unread(p, f, k):
+    """Write to scratch what model `k` knows of drives whose transducers are left out, for `restore_unread`.
 
-    Other lengths depend on such a drive only by how it turns the boom, which is linear near the posture alone. So they do not
-    correct it, but their expected errors contain its variance: a consider state (S. Schmidt, Advances in Control Systems 3
-    (1966), 293-340).
+    Lengths of other cylinders depend on such a drive only by how it turns the boom, which is linear near the posture alone. So
+    they do not correct it, but their expected errors contain its variance: a consider state (S. Schmidt, Advances in Control
+    Systems 3 (1966), 293-340).
     """
     n, drive = p.drives.shape[0], drive_place(p)
-    x, covariance = f.x[k], f.p[k]
     for i in range(3 * n):
         if f.deaf[i % n]:
+            f.turned[i, 3 * n] = f.x[k, drive + i]
+            for j in range(3 * n):
+                f.turned[i, j] = f.p[k, drive + i, drive + j]
+
+
+@inner
+def restore_unread(p, f, k):
+    """Undo what readings since `keep_unread` told model `k` of drives whose transducers are left out."""
+    n, drive = p.drives.shape[0], drive_place(p)
+    for i in range(3 * n):
+        if f.deaf[i % n]:
+            f.x[k, drive + i] = f.turned[i, 3 * n]
             for j in range(3 * n):
                 if f.deaf[j % n]:
-                    if restore:
-                        covariance[drive + i, drive + j] = f.turned[i, j]
-                    else:
-                        f.turned[i, j] = covariance[drive + i, drive + j]
-            if restore:
-                x[drive + i] = f.turned[i, 3 * n]
-            else:
-                f.turned[i, 3 * n] = x[drive + i]
+                    f.p[k, drive + i, drive + j] = f.turned[i, j]
 
 
 @inner

@@ -51,8 +51,8 @@ class Filters(NamedTuple):
     excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
     drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
     m^2. before, interval : (n, 3), (2,) the three lengths before (m); times between the newest two, and of `weights`, s.
-    apart : (n,) recent mean of what angle sensors read more than the lengths make of them, rad. settled : (n,) joints of which
-    the stroke or the angle is known to be wrong; 0 of these.
+    apart : (n,) recent mean of what angle sensors read more than the lengths make of them, rad; 0 where `settled`, the (n,)
+    joints of which the stroke or the angle is known to be wrong.
     lags, late : (streams,) by which stamps are late, as estimated, and by which samples arrived after their stamps at most, s.
     copies : (c,) places of late channels among the copies of one instant, -1 of others. instants : (DELAYED,) stamps of copies,
     see `delayed`. taken : (streams,) stamps of the newest samples that corrected the estimate, ns. curves : (c, 3) expected
