@@ -63,16 +63,13 @@ def find(sensors, times, raw, left, largest, now, is_known, fastest, column, fla
 def read_out(sensors, i):
     """Return the step in which the sensor of channel i is read out; 0 where neither it nor another has shown one.
 
-    It is the resolution that is stated, or the smallest change that the sensor has shown, or, if it has shown none, the largest
-    of these of the other sensors.
+    It is the stated resolution, or the smallest change that the sensor has shown, or, if it has shown none, the smallest of all
+    sensors of the stream.
     """
     shown = sensors.steps[i]
-    if math.isinf(shown):
-        shown = 0.0
-        for j in range(sensors.steps.shape[0]):
-            if math.isfinite(sensors.steps[j]):
-                shown = max(shown, sensors.steps[j])
-    return max(sensors.resolution, shown) if shown > 0.0 else 0.0
+    for j in range(sensors.steps.shape[0] if math.isinf(shown) else 0):
+        shown = min(shown, sensors.steps[j])
+    return max(sensors.resolution, shown) if math.isfinite(shown) else 0.0
 
 
 @inner

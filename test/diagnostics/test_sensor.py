@@ -7,9 +7,10 @@ from math import inf, isnan, nan
 import numpy as np
 import pytest
 
+from boom_twin import Sample, Stream
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import Bounds, ComponentJudge, Evaluation, Hysteresis, Level
-from boom_twin.diagnostics.sensor_status import Channel, ChannelStats, SensorSpec, sensor_status
+from boom_twin.diagnostics.sensor_status import Channel, ChannelStats, SensorSpec, StreamWatch, sensor_status
 from boom_twin.texts import alarm_text
 
 SECOND = 1_000_000_000
@@ -35,6 +36,16 @@ def test_figures_of_a_second() -> None:
     assert none.stamp == 0 and isnan(none.value) and isnan(none.rate) and isnan(none.missing)
     set_back = STAMPS - np.where(np.arange(200) >= 100, 3600 * SECOND, 0) + np.where(np.arange(200) >= 150, 7200 * SECOND, 0)
     assert look(set_back).gap == pytest.approx(0.005) and look(set_back).rate == pytest.approx(200.0)
+
+
+def test_a_sensor_that_never_changed_is_judged_by_the_finest_read_out() -> None:
+    """The first sensor has noise, the second repeats one reading, the third does so after one large change."""
+    watch = StreamWatch(np.array([[-4.0, 4.0]] * 3))
+    for k, (stamp, noise) in enumerate(zip(STAMPS.tolist(), NOISE.tolist(), strict=True)):
+        watch.seen(stamp)
+        watch.took(Sample(Stream.ANGLES, stamp, np.array([noise, 0.3, 0.0 if k == 0 else 0.9])))
+    steps = [each.step for each in watch.look(0.1)]
+    assert steps[0] == steps[1] < 0.1 and steps[2] == 0.9
 
 
 SENSOR = SensorSpec("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
