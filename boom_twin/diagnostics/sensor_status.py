@@ -31,7 +31,7 @@ class ChannelStats:
     missing: float  # share of the messages without a finite value; NaN without messages
     outside: float  # share of the messages with a value out of range; NaN without messages
     unchanged: int  # consecutive readings, up to the newest, that repeat the one before
-    step: float  # smallest change between readings since listening began; before the first, the smallest of all sensors
+    step: float  # smallest change between readings of any sensor of the stream since listening began
 
 
 class Channel:
@@ -160,7 +160,7 @@ class StreamWatch:
         self.lag, self._least = self._least, nan
         found = [channel.look(stamps, table[:, i], refused, longest) for i, channel in enumerate(self._channels)]
         finest = min((each.step for each in found), default=inf)
-        return [replace(each, step=each.step if each.step < inf else finest) for each in found]
+        return [replace(each, step=finest) for each in found]
 
 
 SLOW = 2.0  # largest step of stamps that is no gap at any rate, in sampling periods
