@@ -177,7 +177,8 @@ def test_a_replay_gives_what_the_node_published(recorded: Path, bag: Path, tmp_p
     for key in set(Output) - {Output.DIAGNOSTICS, Output.RESIDUALS}:
         live = published(recorded, TOPICS, key)
         assert len(live) > (0 if key in RARE else 100), key
-        assert live == published(tmp_path / "out" / "bag", TOPICS, key), key
+        here = published(tmp_path / "out" / "bag", TOPICS, key)
+        assert set(live) <= set(here) if key is Output.SHAPE else live == here, key  # a busy node skips shapes
     live, here = (published(path, TOPICS, Output.RESIDUALS) for path in (recorded, tmp_path / "out" / "bag"))
     assert sorted(live) == sorted(here)
     assert {"load": 2, "zero": 2, "reset": 1, "limits": 1}.items() <= result.summary["events"].items()
