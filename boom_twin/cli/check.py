@@ -260,14 +260,15 @@ def _accuracy(
         for name, chosen in sets.items():
             try:
                 streams, places = [stream for _, stream, _ in chosen], {k: v for *_, own in chosen for k, v in own.items()}
-                result = accuracy_at(scene, strokes_of_posture(scene, posture), streams, exact, reads=reads, places=places)
+                drives = strokes_of_posture(scene, posture)
+                result = accuracy_at(scene, drives, streams, exact, reads=reads, places=places)
             except BoomTwinError as error:
                 lines.append(f"  {posture:12} {name:24} {error}")
                 continue
             values[f"accuracy_{posture}:{name}"] = [*result.tip, *result.acceleration, *result.load]
             lines.append(f"  {posture:12} {name:24} {_accuracy_row(result)}")
             if not streams:
-                usual, drives = Settings(), strokes_of_posture(scene, posture)
+                usual = Settings()
                 both = accuracy_at(scene, drives, streams, usual, reads=reads, places=places).tip
                 added = [float(each) for each in (both**2 - result.tip**2) ** 0.5]
                 values[f"scene_error_{posture}"] = added

@@ -6,8 +6,7 @@ import math
 from statistics import NormalDist
 
 from ..kernels.jit import inner, kernel
-from .sensor_survey import BEFORE, SILENT_FOR, loud, noise2_at
-from .sensor_survey import NOISY as NOISY_OVER
+from .sensor_survey import BEFORE, SILENT_FOR, least_noise2, loud, noise2_at, read_out
 
 STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
 FALSE_ALARM = 1e-12  # probability, for each reading, of a finding in white noise
@@ -49,7 +48,7 @@ def find(sensors, times, raw, left, largest, now, is_known, fastest, column, fla
             least = OUTLIER * noise_of(sensors, times, left, i, column)
             is_spiky, jumped[i] = has_spikes(times, left, i, least), jump(times, raw, left, i, least, fastest)
         flags[STUCK, i] = live and newest - sensors.since[i] >= REPEATS_FOR and sensors.run[i] >= most_repeats(sensors, i)
-        flags[NOISY, i] = is_known and power[i] > max(loud(sensors), NOISY_OVER**2 * least_noise2(sensors, i))
+        flags[NOISY, i] = is_known and power[i] > loud(sensors, i)
         flags[SPIKES, i] = is_known and is_spiky
         flags[SILENT, i] = now - sensors.heard[i] > SILENT_FOR or sensors.missing[i] > MISSING
         flags[OUTSIDE, i] = sensors.outside[i] > 0.5 * (count - BEFORE)
@@ -57,26 +56,6 @@ def find(sensors, times, raw, left, largest, now, is_known, fastest, column, fla
         for kind in range(5):
             found = found or flags[kind, i]
     return found
-
-
-@inner
-def read_out(sensors, i):
-    """Return the step in which the sensor of channel i is read out; 0 where neither it nor another has shown one.
-
-    It is the stated resolution, or the smallest change that the sensor has shown, or, if it has shown none, the smallest of all
-    sensors of the stream.
-    """
-    shown = sensors.steps[i]
-    for j in range(sensors.steps.shape[0] if math.isinf(shown) else 0):
-        shown = min(shown, sensors.steps[j])
-    return max(sensors.resolution, shown) if math.isfinite(shown) else 0.0
-
-
-@inner
-def least_noise2(sensors, i):
-    """Return the variance of the noise of channel i as stated, rounded as the sensor is read out."""
-    step = read_out(sensors, i)
-    return max(sensors.stated, sensors.sigma * sensors.sigma + step * step / 12.0)
 
 
 @inner

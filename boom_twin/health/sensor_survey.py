@@ -133,9 +133,30 @@ def survey(sensors, times, raw, left):
 
 
 @inner
-def loud(sensors):
-    """Return the variance of the noise above which a channel is noisy."""
-    return NOISY**2 * min(sensors.lately[0].noise, NOISY**2 * sensors.stated)
+def read_out(sensors, i):
+    """Return the step in which the sensor of channel i is read out; 0 where neither it nor another has shown one.
+
+    It is the stated resolution, or the smallest change that the sensor has shown, or, if it has shown none, the smallest of all
+    sensors of the stream.
+    """
+    shown = sensors.steps[i]
+    for j in range(sensors.steps.shape[0] if math.isinf(shown) else 0):
+        shown = min(shown, sensors.steps[j])
+    return max(sensors.resolution, shown) if math.isfinite(shown) else 0.0
+
+
+@inner
+def least_noise2(sensors, i):
+    """Return the variance of the noise of channel i as stated, rounded as the sensor is read out."""
+    step = read_out(sensors, i)
+    return max(sensors.stated, sensors.sigma * sensors.sigma + step * step / 12.0)
+
+
+@inner
+def loud(sensors, i):
+    """Return the variance of the noise above which channel i is noisy."""
+    usual = min(sensors.lately[0].noise, NOISY**2 * sensors.stated)
+    return NOISY**2 * max(usual, least_noise2(sensors, i))
 
 
 @inner

@@ -110,7 +110,7 @@ class SampleTaker:
         self._boom.doubt(self._doubted)
 
     def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
-        self._boom.leave_out(masked, strokes, strokes)
+        self._boom.leave_out(masked, strokes, np.zeros_like(strokes))
 
     def _restart(self) -> None:
         self._begin_anew()
