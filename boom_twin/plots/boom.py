@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..scene.kinematics import JointPins, Skeleton, skeleton, stroke_curve
+from ..scene.kinematics import Skeleton, skeleton, stroke_curve
 from ..scene.schema import Scene
 from ..types import Array
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, picture
@@ -69,15 +69,6 @@ def _box(axes: Axes, start: Array, stop: Array, width: float, colour: str, order
     axes.fill(x, y, facecolor=colour, edgecolor=GREY, linewidth=0.9, zorder=order, alpha=alpha)
 
 
-def named_pins(joint: JointPins) -> dict[str, Array]:
-    """Return the pins of a joint by the names that the scene gives them."""
-    six_bar = {"D": joint.d, "E": joint.e, "Q": joint.q}
-    ends = {"base pin": joint.barrel_pin, "rod_pin": joint.rod_pin} if joint.d is None else {"C": joint.barrel_pin}
-    if joint.kind in ("B2", "B3"):
-        ends["R"] = joint.rod_pin
-    return {"pivot": joint.pivot, **ends, **{name: pin for name, pin in six_bar.items() if pin is not None}}
-
-
 def section_parts(scene: Scene, bones: Skeleton, i: int) -> list[tuple[Array, Array, bool]]:
     """Return root, beam and head of section `i` (0-based): start, end, True if flexible."""
     section = scene.sections[i]
@@ -124,7 +115,7 @@ def _joint(axes: Axes, scene: Scene, i: int) -> None:
             bones = skeleton(scene, angles)
         joint = bones.joints[i]
         if np.isfinite(joint.rod_pin).all():
-            pins += named_pins(joint).values()
+            pins += joint.named.values()
             _mechanism(axes, scene, bones, i, {0: BLUE, POSITIONS - 1: ORANGE}.get(place))
     low, high = np.min(pins or [np.zeros(2)], axis=0), np.max(pins or [np.ones(2)], axis=0)
     middle, reach = 0.5 * (low + high), 0.62 * max(*(high - low), 0.05 * scene.reach)
@@ -152,7 +143,7 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
         return
     length = scene.joints[i].cylinder.closed_length
     draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, length, slender * length)
-    for name, pin in named_pins(joint).items():
+    for name, pin in joint.named.items():
         draw_pin(axes, pin, 5.0, colour)
         axes.annotate(
             name, (pin[0], pin[1]), (5, 5), textcoords="offset points", fontsize=10, color=colour, weight="bold", zorder=12,

@@ -181,21 +181,23 @@ class PassiveJoints:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._rows = [(joint.kind == "A", plain(linkage(scene, i))) for i, joint in enumerate(scene.joints)]
-        kinds = [(CYLINDER,) if joint.kind == "A" else (CYLINDER, LEFT, RIGHT) for joint in scene.joints]
+        self._joints = [(joint.kind, plain(linkage(scene, i))) for i, joint in enumerate(scene.joints)]
+        kinds = [(CYLINDER,) if kind == "A" else (CYLINDER, LEFT, RIGHT) for kind, _ in self._joints]
         self.names = tuple(name.format(i) for i, own in enumerate(kinds, start=1) for name in own)
 
-    def positions(self, angles: Array) -> list[float]:
-        """Return the angles (rad, from -pi to pi) in the order of `names`, at relative joint `angles` (rad), shape (n,).
+    def positions(self, angles: Array) -> Array:
+        """Return the angles (rad, from -pi to pi) in the order of `names`, at relative joint `angles` (rad), shape (.., n).
 
         A barrel and link L are measured in the section before (the base for joint 1), link R in its own section. NaN where
         the links do not close.
         """
-        positions: list[float] = []
-        with np.errstate(invalid="ignore"):
-            for (direct, row), phi in zip(self._rows, angles.tolist(), strict=True):
-                positions += [_swivel_a(row, phi)] if direct else _swivels_b(row, phi)
-        return positions
+        found = []
+        for (kind, row), phi in zip(self._joints, np.moveaxis(angles, -1, 0), strict=True):
+            pins = _pins_at(kind, row, phi)
+            found.append(np.angle(pins[rod_pin_of(pins)] - pins[barrel_pin_of(pins)]))
+            if "Q" in pins:
+                found += [np.angle(pins["Q"] - pins["D"]), np.angle((pins["Q"] - pins["E"]) * np.exp(-1j * phi))]
+        return np.stack(found, axis=-1)
 
 
 def plain(row: np.record) -> SimpleNamespace:
@@ -203,44 +205,31 @@ def plain(row: np.record) -> SimpleNamespace:
     return SimpleNamespace(**dict(zip(LINKAGE.names or (), row.item(), strict=True)))
 
 
-def _swivel_a(row: SimpleNamespace, phi: float) -> float:
-    x, y = turned(phi, row.ex, row.ey)
-    return math.atan2(y - row.cy, x - row.cx)
-
-
-def _swivels_b(row: SimpleNamespace, phi: float) -> list[float]:
-    left, right = link_angles(row, phi)
-    if row.mount == LINK_L:
-        (x, y), turn = (row.dx, row.dy), left
-    else:
-        (x, y), turn = turned(phi, row.ex, row.ey), right
-    dx, dy = turned(turn, row.along, row.left)
-    barrel = math.atan2(y + dy - row.cy, x + dx - row.cx)
-    return [barrel, float(left), math.remainder(right - phi, math.tau)]
-
-
 @dataclass(frozen=True)
 class JointPins:
-    """Pins of one joint in the model frame, m, each shape (2,); D, E, Q are None for kind A."""
+    """Pins of one joint in the model frame, m, each shape (2,), by the names of `joint_pins`."""
 
     kind: str
-    pivot: Array
-    barrel_pin: Array
-    rod_pin: Array
-    d: Array | None = None
-    e: Array | None = None
-    q: Array | None = None
+    named: dict[str, Array]
+
+    @property
+    def barrel_pin(self) -> Array:
+        """Pin of the cylinder's barrel."""
+        return self.named[barrel_pin_of(self.named)]
+
+    @property
+    def rod_pin(self) -> Array:
+        """Pin of the cylinder's rod."""
+        return self.named[rod_pin_of(self.named)]
 
     @property
     def links(self) -> list[list[Array]]:
         """Corners of link L and of link R; three where the rod pin is on that link beside its ends."""
-        if self.d is None or self.e is None or self.q is None:
+        if self.kind == "A":
             return []
-        left, right = [self.d, self.q], [self.e, self.q]
-        if self.kind == "B2":
-            left.append(self.rod_pin)
-        if self.kind == "B3":
-            right.append(self.rod_pin)
+        left, right = ([self.named[end], self.named["Q"]] for end in "DE")
+        if self.kind != "B1":
+            (left if self.kind == "B2" else right).append(self.named["R"])
         return [left, right]
 
 
@@ -276,11 +265,9 @@ def skeleton(scene: Scene, angles: Array) -> Skeleton:
 
 def _pins(scene: Scene, i: int, pivot: Array, headings: Array) -> JointPins:
     carrier = float(headings[i - 1]) if i else 0.0
-    found = joint_pins(scene, i, np.array(float(headings[i]) - carrier))
-    turn = np.exp(1j * carrier)
+    found, turn = joint_pins(scene, i, np.array(float(headings[i]) - carrier)), np.exp(1j * carrier)
     pins = {name: pivot + np.array([(turn * pin).real, (turn * pin).imag]) for name, pin in found.items()}
-    barrel_pin, rod_pin = pins["C" if i else "cylinder_pin"], pins[rod_pin_of(pins)]
-    return JointPins(scene.joints[i].kind, pivot, barrel_pin, rod_pin, pins.get("D"), pins.get("E"), pins.get("Q"))
+    return JointPins(scene.joints[i].kind, pins)
 
 
 def joint_pins(scene: Scene, i: int, phi: Array) -> dict[str, Array]:
@@ -288,19 +275,27 @@ def joint_pins(scene: Scene, i: int, phi: Array) -> dict[str, Array]:
 
     The rod pin is ``Q`` in kind B1, ``R`` in the other six-bars, ``rod_pin`` in kind A. NaN where the links do not meet.
     """
-    row = plain(linkage(scene, i))
+    return _pins_at(scene.joints[i].kind, plain(linkage(scene, i)), phi)
+
+
+def _pins_at(kind: str, row: SimpleNamespace, phi: Array) -> dict[str, Array]:
     e = np.asarray(_complex(turned(phi, row.ex, row.ey)))
-    pins = {"the pivot": np.zeros_like(e), "C" if i else "cylinder_pin": np.full_like(e, complex(row.cx, row.cy))}
-    if i == 0:
+    pins = {"the pivot": np.zeros_like(e), "cylinder_pin" if kind == "A" else "C": np.full_like(e, complex(row.cx, row.cy))}
+    if kind == "A":
         return pins | {"rod_pin": e}
     with np.errstate(invalid="ignore"):
         left, right = link_angles(row, phi)
     d = complex(row.dx, row.dy)
     pins |= {"D": np.full_like(e, d), "E": e, "Q": np.asarray(d + row.length_l * np.exp(1j * left))}
-    if scene.joints[i].kind != "B1":
+    if kind != "B1":
         base, angle = (d, left) if row.mount == LINK_L else (e, right)
         pins["R"] = np.asarray(base + _complex(turned(angle, row.along, row.left)))
     return pins
+
+
+def barrel_pin_of(pins: dict[str, Array]) -> str:
+    """Return the name of the pin of a joint that holds the barrel."""
+    return "C" if "C" in pins else "cylinder_pin"
 
 
 def rod_pin_of(pins: dict[str, Array]) -> str:

@@ -147,14 +147,14 @@ def test_pins_are_where_the_geometry_has_them(boom: tuple[Scene, Element], share
     poses = frames(robot, positions)
     at(poses["tip"], (0.0, 0.0), bones.pivots[-1])
     for i, joint in enumerate(bones.joints, start=1):
-        at(poses[f"section_{i}"], (0.0, 0.0), joint.pivot)
+        at(poses[f"section_{i}"], (0.0, 0.0), joint.named["the pivot"])
         at(poses[f"cylinder_{i}_barrel"], (0.0, 0.0), joint.barrel_pin)
         at(poses[f"cylinder_{i}_rod"], (0.0, 0.0), joint.rod_pin)
-        if joint.q is not None:
-            at(poses[f"link_l_{i}"], (0.0, 0.0), joint.d)
-            at(poses[f"link_r_{i}"], (0.0, 0.0), joint.e)
-            at(poses[f"link_l_{i}"], (scene.joints[i - 1].lL, 0.0), joint.q)
-            at(poses[f"link_r_{i}"], (scene.joints[i - 1].lR, 0.0), joint.q)
+        if (pins := joint.named).get("Q") is not None:
+            at(poses[f"link_l_{i}"], (0.0, 0.0), pins["D"])
+            at(poses[f"link_r_{i}"], (0.0, 0.0), pins["E"])
+            at(poses[f"link_l_{i}"], (scene.joints[i - 1].lL, 0.0), pins["Q"])
+            at(poses[f"link_r_{i}"], (scene.joints[i - 1].lR, 0.0), pins["Q"])
 
 
 def at(pose: np.ndarray, own: tuple[float, float], expected: Any) -> None:

@@ -25,10 +25,11 @@ def test_pins_agree_with_lengths_and_strokes(name: str) -> None:
     for joint, part, stroke in zip(bones.joints, SCENE.joints, strokes, strict=True):
         length = np.hypot(*(joint.rod_pin - joint.barrel_pin))
         assert length == pytest.approx(part.cylinder.closed_length + stroke, abs=1e-9)
-        if joint.d is not None and joint.e is not None and joint.q is not None:
-            assert np.hypot(*(joint.q - joint.d)) == pytest.approx(part.lL, abs=1e-9)
-            assert np.hypot(*(joint.q - joint.e)) == pytest.approx(part.lR, abs=1e-9)
-            over, out = joint.e - joint.d, joint.q - joint.d
+        if joint.kind != "A":
+            d, e, q = (joint.named[name] for name in "DEQ")
+            assert np.hypot(*(q - d)) == pytest.approx(part.lL, abs=1e-9)
+            assert np.hypot(*(q - e)) == pytest.approx(part.lR, abs=1e-9)
+            over, out = e - d, q - d
             assert over[0] * out[1] - over[1] * out[0] > 0.0, "Q is not to the left of D->E"
     sides = [part.length * np.exp(1j * np.radians(up)) for part, up in zip(SCENE.sections, SCENE.postures[name], strict=True)]
     assert complex(*bones.pivots[-1]) == pytest.approx(complex(*SCENE.base.pivot) + sum(sides), abs=1e-12)

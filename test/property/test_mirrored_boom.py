@@ -67,8 +67,8 @@ def test_pins_and_passive_joints(make):
         angles = posture_angles(scene, posture)
         assert posture_angles(image, posture) == pytest.approx(-angles)
         for joint, other in zip(skeleton(scene, angles).joints, skeleton(image, -angles).joints, strict=True):
-            for place in ("pivot", "barrel_pin", "rod_pin", "d", "e", "q"):
-                one, two = getattr(joint, place), getattr(other, place)
-                assert (one is None) == (two is None) and (one is None or two * FLIP == pytest.approx(one, abs=1e-12))
+            assert joint.named.keys() == other.named.keys()
+            for name, pin in joint.named.items():
+                assert other.named[name] * FLIP == pytest.approx(pin, abs=1e-12)
         passive = np.array([PassiveJoints(one).positions(sign * angles) for one, sign in ((scene, 1.0), (image, -1.0))])
         assert np.exp(1j * passive[1]) == pytest.approx(np.exp(-1j * passive[0]), abs=1e-12)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...config.yaml_text import Place
 from ...errors import Fault
 from ...types import Array
-from ..kinematics import joint_curve, joint_pins, linkage, rod_pin_of
+from ..kinematics import barrel_pin_of, joint_curve, joint_pins, linkage, rod_pin_of
 from ..schema import Cylinder, Joint, Oil, Point, Scene
 from . import Draft, Findings
 
@@ -323,7 +323,7 @@ def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) ->
     """Return the pins beside the cylinder's own two, in the axes of its carrier, as complex numbers x + iy, m."""
     wall = 0.12  # of a barrel, over its bore
     pins = joint_pins(scene, i, phi)
-    foot, rod_pin = pins.pop("C" if i else "cylinder_pin"), pins.pop(rod_pin_of(pins))
+    foot, rod_pin = pins.pop(barrel_pin_of(pins)), pins.pop(rod_pin_of(pins))
     length = np.abs(rod_pin - foot)
     barrel = 0.9 * cylinder.closed_length  # the rest is the rod's end and its eye
     for name, pin in (pins | _pins_before(scene, i, pins["the pivot"])).items():
