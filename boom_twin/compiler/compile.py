@@ -5,8 +5,7 @@ Only what the scene names gets rows. Section axes: x from the inboard pivot; the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import Any, Literal
 
@@ -21,7 +20,7 @@ from ..kernels.tables import Tables
 from ..scene.kinematics import gravity_in_base, linkage
 from ..scene.oil_spring import oil_record
 from ..scene.schema import Cylinder, Pin, RigidPart, Scene
-from ..scene.segmentation import SAME_PLACE, flexible_parts
+from ..scene.segmentation import SAME_PLACE, CylinderPin, cylinder_pins, flexible_parts, splits
 from ..types import Array
 from .plan import Layout, Plan
 
@@ -55,16 +54,6 @@ def compile_scene(scene: Scene, basis: BasisName = "end-shapes") -> Plan:
         builder.joint(index)
         builder.section(index)
     return builder.finish()
-
-
-@dataclass(frozen=True)
-class _Pin:
-    """A pin of a cylinder on a section: where along it and beside it, and what it is to the sweep."""
-
-    x: float
-    y: float
-    cylinder: int
-    kind: int
 
 
 class _Builder:
@@ -167,7 +156,7 @@ class _Builder:
 
     def section(self, index: int) -> None:
         """Section `index`: root, flexible parts between pins, head."""
-        section, pins = self.scene.sections[index], self._pins(index)
+        section, pins = self.scene.sections[index], cylinder_pins(self.scene, index)
         if not self.scene.is_flexible(index):
             self._body(self._rigid_parts(index), 0.0)
             self._stations(pins, 0.0)
@@ -178,29 +167,17 @@ class _Builder:
         self._body(self._with_line(section.root, 0.0, x0), 0.0)
         self._stations([pin for pin in pins if pin.x <= x0 + SAME_PLACE], 0.0)
         self._offset(x0)
-        inner = [pin for pin in pins if x0 + SAME_PLACE < pin.x < x1 - SAME_PLACE]
         for start, stop in flexible_parts(self.scene, index):
             self._beam(index, stop - start)
-            self._stations([pin for pin in inner if pin.x == stop], stop)
+            self._stations([pin for pin in splits(self.scene, index) if pin.x == stop], stop)
         self._body(self._with_line(section.head, x1, section.length), x1)
         self._stations([pin for pin in pins if pin.x >= x1 - SAME_PLACE], x1)
         self._offset(section.length - x1)
 
-    def _pins(self, index: int) -> list[_Pin]:
-        pins = []
-        if index + 1 < len(self.scene.joints):
-            c = self.scene.joints[index + 1].C
-            assert c is not None
-            pins.append(_Pin(self.scene.sections[index].length + c[0], c[1], index + 1, program.STATION))
-        if index == 0:
-            rod_pin = self.scene.sections[0].rod_pin
-            assert rod_pin is not None
-            pins.append(_Pin(rod_pin[0], rod_pin[1], 0, program.ROD_PIN))
-        return pins
-
-    def _stations(self, pins: list[_Pin], frame: float) -> None:
+    def _stations(self, pins: Iterable[CylinderPin], frame: float) -> None:
         for pin in pins:
-            self.layout.operate(pin.kind, self.layout.add("outlets", cylinder=pin.cylinder, x=pin.x - frame, y=pin.y))
+            kind = program.STATION if pin.cylinder else program.ROD_PIN
+            self.layout.operate(kind, self.layout.add("outlets", cylinder=pin.cylinder, x=pin.x - frame, y=pin.y))
 
     def _offset(self, length: float) -> None:
         if length > SAME_PLACE:

@@ -21,25 +21,35 @@ LEAST_FLEXIBLE = 3  # flexible parts of any boom that bends
 
 
 @dataclass(frozen=True, slots=True)
-class Split:
-    """A pin on a flexible part: x from the inboard pivot (m), and whose pin it is."""
+class CylinderPin:
+    """Pin of a cylinder (0-based) on a section: x from the inboard pivot and y beside the axis, m."""
 
     x: float
-    pin: str
+    y: float
+    cylinder: int
+
+    @property
+    def pin(self) -> str:
+        """Name of the pin for people: only the first cylinder has its rod on a section."""
+        return f"barrel pin C of cylinder {self.cylinder + 1}" if self.cylinder else "rod pin of cylinder 1"
 
 
-def splits(scene: Scene, index: int) -> tuple[Split, ...]:
-    """Return the splits of the beam of section `index` (0-based) from inboard to outboard; none for a rigid section."""
-    section = scene.sections[index]
-    if section.beam is None or not scene.is_flexible(index):
-        return ()
-    pins = []
-    if index == 0 and section.rod_pin is not None:
-        pins.append(Split(section.rod_pin[0], "rod pin of cylinder 1"))
+def cylinder_pins(scene: Scene, index: int) -> list[CylinderPin]:
+    """Return the pins of cylinders on section `index` (0-based): of the next joint's barrel, and of the first rod."""
+    section, pins = scene.sections[index], []
     if index + 1 < len(scene.joints) and (c := scene.joints[index + 1].C) is not None:
-        pins.append(Split(section.length + c[0], f"barrel pin C of cylinder {index + 2}"))
-    x0, x1 = section.beam
-    inside = [pin for pin in pins if x0 + SAME_PLACE < pin.x < x1 - SAME_PLACE]
+        pins.append(CylinderPin(section.length + c[0], c[1], index + 1))
+    if index == 0 and section.rod_pin is not None:
+        pins.append(CylinderPin(*section.rod_pin, 0))
+    return pins
+
+
+def splits(scene: Scene, index: int) -> tuple[CylinderPin, ...]:
+    """Return the pins on the beam of section `index` (0-based) from inboard to outboard; none for a rigid section."""
+    beam = scene.sections[index].beam
+    if beam is None or not scene.is_flexible(index):
+        return ()
+    inside = [pin for pin in cylinder_pins(scene, index) if beam[0] + SAME_PLACE < pin.x < beam[1] - SAME_PLACE]
     return tuple(sorted(inside, key=lambda pin: pin.x))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from .kinematics import RANGE_SAMPLES, joint_curve, linkage, stroke_range
 from .oil_spring import STATIONS, stiffness
 from .schema import IDEAL_BELOW, Joint, Pin, Scene, Section
-from .segmentation import Split, flexible_parts, splits
+from .segmentation import CylinderPin, flexible_parts, splits
 
 
 def left_out(scene: Scene) -> dict[str, str]:
@@ -90,7 +90,7 @@ class SectionAccount:
     number: int
     section: Section
     parts: tuple[tuple[float, float], ...]  # ends of its flexible parts, m
-    splits: tuple[Split, ...]
+    splits: tuple[CylinderPin, ...]
     bending: int  # coordinates of each part
     axial: int
     fill_mass: float  # kg

@@ -22,6 +22,7 @@ from ...errors import Fault
 from ...types import Array
 from ..kinematics import barrel_pin_of, joint_curve, joint_pins, linkage, rod_pin_of
 from ..schema import Cylinder, Joint, Oil, Point, Scene
+from ..segmentation import cylinder_pins
 from . import Draft, Findings
 
 ROUNDING = 1e-9  # m, deg
@@ -61,18 +62,17 @@ def _bending(scene: Scene, i: int) -> Point:
 
 def thin_parts(draft: Draft) -> Findings:
     """Yield warnings of pins just beside an end of the beam, which cut off a sliver of it."""
-    for i, section in enumerate(draft.scene.sections):
-        pins: list[tuple[Place, Point, float]] = []
-        if i + 1 < len(draft.scene.joints) and (c := draft.scene.joints[i + 1].C) is not None:
-            pins.append((("joints", i + 1, "C"), c, section.length + c[0]))
-        if section.rod_pin is not None:
-            pins.append((("sections", i, "rod_pin"), section.rod_pin, section.rod_pin[0]))
-        beam = _bending(draft.scene, i)
-        for place, value, x in pins:
-            for end in beam if beam[0] < x < beam[1] else ():
-                if ROUNDING < abs(x - end) < 0.01 * section.length:
-                    bound = f"the pin splits the beam {abs(x - end) * 1e3:.3g} mm from its end, at x = {end:g} m"
-                    yield draft.warning(place, value, bound, f"Let the beam end at the pin, x = {x:.6g} m, or move the pin.")
+    scene = draft.scene
+    for i, section in enumerate(scene.sections):
+        beam = _bending(scene, i)
+        for pin in cylinder_pins(scene, i):
+            for end in beam if beam[0] < pin.x < beam[1] else ():
+                if ROUNDING < abs(pin.x - end) < 0.01 * section.length:
+                    place: Place = ("joints", pin.cylinder, "C") if pin.cylinder else ("sections", 0, "rod_pin")
+                    value = scene.joints[pin.cylinder].C if pin.cylinder else section.rod_pin
+                    bound = f"the pin splits the beam {abs(pin.x - end) * 1e3:.3g} mm from its end, at x = {end:g} m"
+                    remedy = f"Let the beam end at the pin, x = {pin.x:.6g} m, or move the pin."
+                    yield draft.warning(place, value, bound, remedy)
 
 
 def _far(length: float, point: Point) -> bool:
