@@ -321,9 +321,7 @@ class Report:
     stamp: int
     """Stamp of the sample, nanoseconds."""
     accepted: bool
-    """False if the sample was not used; `events` says why. A held one serves time checks only, unless it is in the
-    `earlier` of a later report.
-    """
+    """False if the sample was not used; `events` says why. Of a ``leap``, only the stamp is used."""
     prediction: Prediction | None = None
     """Prediction at every stroke sample that the model was stepped to."""
     residuals: tuple[Residuals, ...] = ()
@@ -338,10 +336,3 @@ class Report:
     """Set once a second, and when an alarm begins, changes or ends."""
     estimate: Estimate | None = None
     """Set beside every prediction."""
-    earlier: tuple[Report, ...] = ()
-    """Reports of samples that were held until this one confirmed their stamps, in their order."""
-
-    @property
-    def all(self) -> tuple[Report, ...]:
-        """Reports of `earlier`, and this one: everything that this sample caused, in order."""
-        return (*self.earlier, self) if self.earlier else (self,)

@@ -32,7 +32,7 @@ from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .rest_at_readings import RestFinder
 from .sensor_model import mounting_of
-from .states import DOUBTS, ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
+from .states import DOUBTS, ESTIMATE, FED, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
 from .tip_estimate import add_scene_error
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
@@ -219,20 +219,6 @@ class BoomPredictor:
         """Rates of what drives the model at the newest sample, as estimated, m/s or rad/s, shape (n,)."""
         return np.asarray(self.filters.strokes[:, 1])
 
-    def least_way(self, span: float, sure: float) -> float:
-        """Return how far (m or rad) the fastest drive goes on for `span` s at least, unless it brakes harder than it now does.
-
-        Speeds and braking are taken `sure` deviations to the safe side.
-        """
-        n, f = self.plan.joints, self.filters
-        first = drive_place(self.posture) + n
-        mean, deviations = f.mean[PREDICTION], np.sqrt(np.maximum(f.spread[PREDICTION].diagonal(), 0.0))
-        rates, accelerations = slice(first, first + n), slice(first + n, first + 2 * n)
-        speeds = np.maximum(np.abs(mean[rates]) - sure * deviations[rates], 0.0)
-        braking = np.maximum(-mean[accelerations] * np.sign(mean[rates]), 0.0) + sure * deviations[accelerations]
-        ways = np.minimum(speeds * span, speeds**2 / (2.0 * np.maximum(braking, 1e-12)))
-        return float((ways * np.abs(self.posture.slope)).max() if self._reads is StrokeReading.ANGLE else ways.max())
-
     # -- changes by the twin
 
     def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_], angles: NDArray[np.bool_]) -> None:
@@ -298,11 +284,6 @@ class BoomPredictor:
         """Return the places of the zeros of these sensors among those of all."""
         names = [name for stream, names in self.channels.items() if stream is not Stream.STROKES for name in names]
         return sorted(int(row.zero) for name, row in zip(names, self.posture.channels, strict=True) if name in channels)
-
-    def rebase(self, shift: int) -> None:
-        """Shift stamps by `shift` (ns) from now on."""
-        self.filters.status[FED_STAMP] += shift
-        self.filters.instants[:] += shift
 
     def add_phase(self) -> None:
         """Add the phase uncertainty of the vibration at the newest sample after a pause of unknown length.

@@ -60,17 +60,16 @@ class TwinWatch:
     def took(self, sample: Sample, report: Report, duration: float) -> None:
         """Take the `report` that the twin made of `sample` in `duration` seconds."""
         self._streams[sample.stream].took(sample)
-        for each in report.all:
-            self._model.took(each, duration if each is report else 0.0)
-            for residuals in each.residuals:
-                if (rows := self._rows.get(residuals.names)) is None:
-                    rows = self._rows[residuals.names] = RowBuffer(len(residuals.names))
-                rows.add(residuals.stamp, residuals.normalised)
-            if each.prediction is not None:
-                self._newest = each
-            self._swing.took(each)
-            self._load.took(each)
-            self.judged(each.health, 0.0)
+        self._model.took(report, duration)
+        for residuals in report.residuals:
+            if (rows := self._rows.get(residuals.names)) is None:
+                rows = self._rows[residuals.names] = RowBuffer(len(residuals.names))
+            rows.add(residuals.stamp, residuals.normalised)
+        if report.prediction is not None:
+            self._newest = report
+        self._swing.took(report)
+        self._load.took(report)
+        self.judged(report.health, 0.0)
 
     def judged(self, health: Health | None, duration: float) -> None:
         """Take the rig's `health`, computed in `duration` seconds; None without news."""

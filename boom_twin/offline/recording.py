@@ -149,7 +149,7 @@ class Recording:
         self._rows_by_first_clock: int | None = None
         self._whole: Stretch | None = None
         self.gaps: list[tuple[int, int]] = []  # stamps (ns) between which strokes paused
-        self.clock_sets: list[tuple[int, int]] = []  # stamps (ns) before and after a clock was set
+        self.clock_sets: list[tuple[int, int]] = []  # stamps (ns) before and after a clock was set back
         self.refused = 0  # samples that were not used
         self.is_judged = False  # whether the rig's health was
         self.noise: Mapping[str, float] = {}  # see `Health.noise`; the newest
@@ -159,10 +159,9 @@ class Recording:
         self._samples.append(samples)
         self.read_out.add(samples)
         self._parts.append(rows)
-        held = {"leap", "late", "second source"}  # such samples were left out, unless a later report gives them
+        stamp_only = {"leap", "late", "second source"}  # values of such samples are not used
         for row, note in rows.notes.items():
-            is_refused = not note.accepted or not held.isdisjoint(note.events)
-            self.refused += is_refused - note.was_held
+            self.refused += not note.accepted or not stamp_only.isdisjoint(note.events)
             self._note_time(rows.predictions, row, frozenset(note.events))
         stamps = rows.predictions.stamps
         if len(stamps):
@@ -182,7 +181,7 @@ class Recording:
         if at == len(predictions.at) or predictions.at[at] != row:
             return
         before = int(predictions.stamps[at - 1]) if at else self._newest
-        for found, kinds in ((self.gaps, {"gap", "restart"}), (self.clock_sets, {"clock set", "jump back"})):
+        for found, kinds in ((self.gaps, {"gap", "restart"}), (self.clock_sets, {"jump back"})):
             if before is not None and events & kinds:
                 found.append((before, int(predictions.stamps[at])))
         if self.clock_sets and self._rows_by_first_clock is None:

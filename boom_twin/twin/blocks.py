@@ -5,7 +5,6 @@ The order of the rows is the order in which the samples were taken. Stamps are i
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -144,7 +143,6 @@ class Note(NamedTuple):
     events: tuple[str, ...] = ()
     status: str = "ok"
     change: Change | None = None
-    was_held: bool = False  # True if an earlier report already announced this sample as held
 
 
 REGULAR = Note()
@@ -195,11 +193,6 @@ class ReportBlock(NamedTuple):
             )
             for row, stamp in enumerate(self.stamps.tolist())
         ]
-
-    def report(self, joints: int) -> Report:
-        """Return the report of the last sample, with those before it as `Report.earlier`."""
-        *earlier, last = self.reports(joints)
-        return replace(last, earlier=tuple(earlier))
 
 
 def block_of(samples: list[Sample], joints: int) -> SampleBlock:
@@ -252,9 +245,8 @@ EVENTS = {
     "gap": "longer pause between strokes, bridged",
     "restart": "pause too long to bridge, or strokes elsewhere after it; started again from rest",
     "stroke elsewhere": "a stroke jumped where its cylinder cannot go, and stayed there for a second; started from rest",
-    "leap": "stamp far from its stream; left out unless the next follows within `gap` (raise it below 10 Hz)",
-    "clock set": "stamps went on elsewhere, strokes where they were; the model goes on, by the new stamps",
-    "jump back": "time was set back, and strokes did not go on where they were; started again from rest",
+    "leap": "stamp far from its stream; left out, the next is used if it follows within `gap` (raise it below 10 Hz)",
+    "jump back": "time was set back; started again from rest",
     "second source": "samples of another source among those that are followed; left out",
     "implausible": "a stroke where its cylinder cannot be; left out, for up to a second if it jumped there",
     "out of range": "a stroke outside 0 to max_stroke of its cylinder; used where it is plausible",
@@ -272,7 +264,7 @@ EVENTS = {
 CONSEQUENCES = frozenset({"waiting", "model", "unmatched"})
 """Events that follow from others."""
 
-TOLD_AT_ONCE = frozenset({"restart", "stroke elsewhere", "clock set", "jump back", "reset", "load", "limits", "zero"})
+TOLD_AT_ONCE = frozenset({"restart", "stroke elsewhere", "jump back", "reset", "load", "limits", "zero"})
 """Events whose report also has a `Change`."""
 
 

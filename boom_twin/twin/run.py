@@ -62,12 +62,6 @@ class Run:
         old = past.strokes[row - 1]
         return np.asarray(past.strokes[row] if share == 1.0 else old + share * (past.strokes[row] - old))
 
-    def rebase(self, shift: int) -> None:
-        """Shift all stamps by `shift` (ns); discard what is stored by stamp."""
-        self._state.clock[EPOCH] += shift
-        self._state.clock[NEWEST] += shift
-        self._state.past.bounds[:] = 0
-
     def is_of_others(self, stamp: int, values: Array, estimate: Array, limits: Limits) -> bool:
         """Return True if two or more strokes are out of reach of their cylinders, probably of another boom.
 

@@ -169,7 +169,6 @@ def merged(reports: Sequence[Report]) -> Report:
         residuals=tuple(row for report in reports for row in report.residuals),
         events=tuple(dict.fromkeys(event for report in reports for event in report.events)),
         status=next((report.status for report in reports if report.status != "ok"), "ok"),
-        earlier=tuple(one for report in reports for one in report.earlier),
         **last,
     )
 

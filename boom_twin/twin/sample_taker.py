@@ -38,10 +38,10 @@ from ..types import (
 )
 from .adjustments import Requests, ResidualBuffer, SensorZeros, limits_of
 from .block_update import BlockUpdate
-from .blocks import CODES, REGULAR, Note, ReportBlock, SampleBlock, joined
+from .blocks import CODES, REGULAR, Note, ReportBlock, SampleBlock
 from .run import Run
 from .sample_check import SampleCheck
-from .stamp_check import Action, StampCheck, TimeStep, verdict_on
+from .stamp_check import StampCheck, verdict_on
 from .state import FOLLOWER_ROOM, NEWEST, NONE, ROOM, SHORTEST_STEP, STATUS, UNMATCHED, drop_waiting, near, new_state
 from .update import DONE, FAILED
 
@@ -204,43 +204,17 @@ class SampleTaker:
             if run.is_of_others(sample.stamp - run.epoch, values, self._boom.expected(values), self._compiled.limits):
                 return self._refuse(sample, "implausible")
             return self._follow(sample, values, complete, [])
-        verdict = verdict_on(sample, line, run, self._boom, self._compiled.limits, self.settings, self._zeroed)
-        if verdict.action is Action.FOLLOW:
-            return self._follow(sample, values, complete, [])
-        if verdict.action is Action.STEP:
-            return self._step_in_time(run, line, verdict.why)
-        return self._refuse(sample, verdict.event, held=verdict.action is Action.HOLD)
-
-    def _step_in_time(self, run: Run, line: StampCheck, why: TimeStep) -> ReportBlock:
-        held, usual = line.release(self.counts), round(line.usual)
-        span = held[0].stamp - run.newest
-        events = ["gap"] if span * NANO > self.settings.gap else []
-        if why is TimeStep.CLOCK:
-            events = ["clock set"]
-            self._rebase(run, span - usual)
-        elif why is TimeStep.NEITHER:
-            events = ["restart" if span > 0 else "jump back"]
+        verdict = verdict_on(sample, values, line, run, self._boom, self._compiled.limits, self.settings)
+        if not verdict.is_followed:
+            return self._refuse(sample, verdict.event, is_noted=verdict.is_noted)
+        if verdict.event:
+            line.change_over()
+        if verdict.event == "gap":
+            self._boom.add_phase()  # stamps do not tell a pause from a clock that was set
+        elif verdict.event:
             self._restart()
-        elif events and why is TimeStep.EITHER:
-            self._boom.add_phase()
-        reports, asked = [], self._judged
-        for sample in held:
-            complete, self._judged = self._is_complete(sample), asked or sample is not held[-1]
-            reports.append(self._follow(sample, self._zeroed(sample), complete, events))
-            events = []
-        return joined([*(each.noted(was_held=True) for each in reports[:-1]), reports[-1]])
-
-    def _rebase(self, run: Run, shift: int) -> None:
-        before = run.newest
-        run.rebase(shift)
-        self._boom.rebase(shift)
-        for line in self._lines.values():
-            line.forget()
-        self._zeros.forget_past()
-        self._recent.clear()
-        if shift < 0:
-            drop_waiting(self._state, before + 1, -NONE)
-        self._compiled.begin_health()
+            values = self._zeroed(sample)
+        return self._follow(sample, values, complete, [verdict.event] if verdict.event else [])
 
     def _zeroed(self, sample: Sample) -> Array:
         """Return what drives the model less its zeros; of inclinometers, the turn next to what is expected."""
@@ -258,7 +232,6 @@ class SampleTaker:
         if asked:
             events += self._take_over(sample.stamp)
             values = self._zeroed(sample)
-        told = asked or "clock set" in events
         limits = self._compiled.limits
         if ((values < limits.shortest) | (values > limits.longest)).any():
             events.append("out of range")
@@ -270,7 +243,7 @@ class SampleTaker:
         else:
             return self._refuse(sample, "waiting", *events)
         has_begun = from_rest and report.notes.get(0, REGULAR).accepted
-        if told or has_begun:
+        if asked or has_begun:
             is_new = from_rest and self._is_new
             self._is_new &= not has_begun
             return report.noted(change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values, is_new))
@@ -316,14 +289,13 @@ class SampleTaker:
         span = (sample.stamp - line.newest) * NANO
         if -self.settings.jump_back <= span <= 0.0:
             return self._refuse(sample, "duplicate" if span == 0.0 else "late")
-        event = line.hold(sample, "leap")
+        line.note(sample)
         if not line.is_confirmed():
-            return self._refuse(sample, event, held=True)
-        held = line.release(self.counts)
-        gone = drop_waiting(self._state, held[0].stamp, -NONE, CODES[sample.stream])  # their time comes again: a looped bag
+            return self._refuse(sample, "second source" if line.is_second else "leap", is_noted=True)
+        # stamps of a looped bag come again
+        gone = drop_waiting(self._state, line.change_over(), -NONE, CODES[sample.stream])
         self._state.clock[UNMATCHED] += gone
-        reports = [self._compare(each, self._is_complete(each)) for each in held]
-        return joined([*(each.noted(was_held=True) for each in reports[:-1]), reports[-1]])
+        return self._compare(sample, complete)
 
     def _compare(self, sample: Sample, complete: bool) -> ReportBlock:
         self._lines[sample.stream].take(sample.stamp)
@@ -335,10 +307,10 @@ class SampleTaker:
             return self._refuse(sample, "unmatched", *events)
         return self._compiled.rows(np.array([sample.stamp]), events)
 
-    def _refuse(self, sample: Sample, *events: str, status: str = "ok", held: bool = False) -> ReportBlock:
-        """Return the report of a sample whose values are not used, or if `held` not used for now."""
+    def _refuse(self, sample: Sample, *events: str, status: str = "ok", is_noted: bool = False) -> ReportBlock:
+        """Return the report of a sample whose values are not used; its stamp is, if `is_noted`."""
         self.counts.update(events)
-        return self._compiled.no_rows(sample.stamp, Note(held, events, status))
+        return self._compiled.no_rows(sample.stamp, Note(is_noted, events, status))
 
     def _is_complete(self, sample: Sample) -> bool:
         return bool((np.abs(sample.values) <= LIMIT)[self._there[sample.stream]].all())

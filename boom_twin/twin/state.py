@@ -63,7 +63,7 @@ class TwinState(NamedTuple):
     interval: Array  # (1,), running mean of the time between strokes, s; 0 while unknown
     newest: Integers  # (s,), stamp of the newest sample of every stream, ns; NONE before the first
     usual: Array  # (s,), time from one sample to the next, ns; 0 while unknown
-    held: Integers  # (s,), samples that are held, see `boom_twin.twin.stamp_check`
+    beside: Integers  # (s,), 1 if the newest stamp was of another line, see `boom_twin.twin.stamp_check`
     strokes: Array  # (n,), newest strokes or angles that drive the model, less their zeros, m or rad; NaN where missing
     taken: Array  # (n,), the same as the model is to take them
     past: Ring  # expected readings (c,), their deviations and the strokes, of the last `SPAN`
@@ -138,7 +138,7 @@ def new_state(joints: int, channels: Integers, room: Room) -> TwinState:
     streams, width, measured = len(channels), int(channels.max()), int(channels[1:].sum())
     return TwinState(
         clock=np.zeros(10, np.int64), interval=np.zeros(1),
-        newest=np.full(streams, NONE), usual=np.zeros(streams), held=np.zeros(streams, np.int64),
+        newest=np.full(streams, NONE), usual=np.zeros(streams), beside=np.zeros(streams, np.int64),
         strokes=np.zeros(joints), taken=np.zeros(joints),
         past=new_ring(room.expected, measured, measured, joints), waiting=new_ring(WAITING, width),
         recent=new_ring(room.recent, width),
@@ -226,7 +226,7 @@ def reach_of_strokes(far, rate, span):
 def are_strokes_regular(estimates, limits, state, stamp, values):
     """Return True if strokes, or angles that drive the model, are on time, complete and within reach; write them to `state`."""
     drive = limits.drive
-    if state.held[drive] or stamp - state.clock[NEWEST] < SHORTEST_STEP or state.newest[drive] == NONE:
+    if state.beside[drive] or stamp - state.clock[NEWEST] < SHORTEST_STEP or state.newest[drive] == NONE:
         return False
     if not is_next(state.newest[drive], state.usual[drive], limits.gap, stamp):
         return False
@@ -260,7 +260,7 @@ def is_regular(limits, state, stream, stamp, values):
         most = longest_step(state.usual[stream], limits.gap)
     if (
         limits.channels[stream] == 0
-        or state.held[stream]
+        or state.beside[stream]
         or (state.newest[stream] != NONE and not 0 < stamp - state.newest[stream] <= most)
     ):
         return False

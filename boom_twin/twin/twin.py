@@ -207,7 +207,7 @@ class Twin(SampleTaker):
         if self._run is not None and not (self.requests.due and sample.stream is self._drive):
             reason = self._advance_one(sample)
         if reason != DONE:
-            return self._take_irregular(sample, reason).report(self.plan.joints)
+            return self._take_irregular(sample, reason).reports(self.plan.joints)[0]
         report = self._compiled.report(sample.stamp, judged)
         if self._fault_twins is not None and self._fault_twins.wants(CODES[sample.stream], sample.stamp):
             self._fault_twins.take(block_of([sample], self.plan.joints))
@@ -267,7 +267,7 @@ class Twin(SampleTaker):
         Returns
         -------
         ReportBlock
-            Reports of the samples in their order. Those of samples that were held stand before the one that confirmed them.
+            Reports of the samples in their order.
 
         Raises
         ------

@@ -103,5 +103,5 @@ def test_readings_between_slow_strokes_err_by_the_interpolation_as_stated() -> N
 def estimates(samples: list[Sample]) -> dict[int, Estimate]:
     """Estimates of a twin by stamp."""
     twin = Twin(SCENE, Settings(gap=1.0))
-    reports = [each for sample in samples for each in twin.update(sample).all]
+    reports = [twin.update(sample) for sample in samples]
     return {each.stamp: each.estimate for each in reports if each.estimate is not None}

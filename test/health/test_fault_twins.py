@@ -63,7 +63,7 @@ def test_sample_by_sample_as_by_blocks():
     """A twin that takes samples one by one names the same causes, with the same reports of health, as one that takes blocks."""
     scene, samples = stiffer("cylinder_2.k"), session(20.0)
     one, many = (Twin(scene, health=True, causes=True) for _ in range(2))
-    single = [report.health for sample in samples for report in one.update(sample).all if report.health is not None]
+    single = [report.health for sample in samples if (report := one.update(sample)).health is not None]
     found = []
     for first in range(0, len(samples), 997):
         found += many.take(block_of(samples[first : first + 997], len(scene.joints))).health.values()

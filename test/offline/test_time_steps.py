@@ -65,7 +65,7 @@ def little_memory() -> Iterator[None]:
 @pytest.mark.parametrize("days", [10, 5000])
 def test_memory_of_a_replay_goes_by_its_samples(tmp_path: Path, days: int, little_memory: None) -> None:
     bag = write(tmp_path / "bag", samples(lambda row: days * DAY * (row >= ROWS // 2)))
-    assert replayed(bag)["samples"] == ROWS
+    assert ROWS - 21 <= replayed(bag)["samples"] < ROWS  # the step must be confirmed for `gap`
 
 
 def recorded(path: Path, found: list[Sample], logs: list[int], **options: Any) -> Path:
@@ -154,8 +154,7 @@ def test_samples_that_wait_for_the_first_strokes_are_dropped_when_their_stamps_c
     stamps = [
         (residual.stream, residual.stamp)
         for sample in first
-        for report in twin.update(sample).all
-        for residual in report.residuals
+        for residual in twin.update(sample).residuals
         if residual.stream is not Stream.STROKES
     ]
     assert len(stamps) - len(set(stamps)) <= 4 and len(set(stamps)) > 780  # until their step is confirmed

@@ -40,7 +40,7 @@ def told(node: Any, before: str) -> list[str]:
 
 
 def test_publishers_are_restarted_and_clocks_jump(node: Any, rig: Rig) -> None:
-    """The model goes on where the strokes do: nothing of that starts it from rest."""
+    """A pause is bridged; a longer one, or time that was set, starts the model from rest, and is told."""
     before = node.said()
     for topic, pause in itertools.product(["cylinder_strokes", "joint_angles"], [0, SECOND // 2, 6 * SECOND]):
         rig.node.destroy_publisher(rig.publishers.pop(topic))
@@ -53,7 +53,7 @@ def test_publishers_are_restarted_and_clocks_jump(node: Any, rig: Rig) -> None:
     for jump in (-3, 3600, -3600, -20):  # the first one as of a looped bag
         rig.stamp += jump * SECOND
         rig.until_right()
-    assert set(told(node, before)) == {"clock set; the model goes on"}  # at most a line a second
+    assert set(told(node, before)) == {"started from rest (restart)", "started from rest (jump back)"}
 
 
 def test_settings_and_services(node: Any, rig: Rig, remote: Any) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from itertools import chain
 from pathlib import Path
 from threading import Thread
 from time import perf_counter
@@ -159,7 +158,7 @@ class TwinView:
         self._feed.topic_rows.measure(sample)
         self._watch.seen(sample.stream, sample.stamp)
         self._watch.took(sample, report, 0.0)
-        for key, encoded in chain.from_iterable(map(self._encoder.fill, report.all)):
+        for key, encoded in self._encoder.fill(report):
             if key in self._names:
                 self._feed.topic_rows.take_encoded(self._names[key], encoded, self._feed.now())
         if self._time - self._looked >= diagnosis_period or self._watch.is_urgent():

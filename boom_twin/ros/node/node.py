@@ -275,10 +275,9 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         began = perf_counter()
         report = self._twin.update(sample, judged=False)
         self._diagnostics.watch.took(sample, report, perf_counter() - began)
-        for each in report.all:
-            if each.change is not None:
-                self._start_log.tell(each, each.change)
-            self._publish(each)
+        if report.change is not None:
+            self._start_log.tell(report, report.change)
+        self._publish(report)
         if self._twin.is_health_due:
             self._judge(self._twin, sample.stamp)
 

@@ -118,8 +118,6 @@ class StartLog:
             words.insert(0, f"could not start: {report.status}")
         elif change.from_rest:
             words.insert(0, f"started from rest ({', '.join(report.events) or 'first strokes'})")
-        elif "clock set" in report.events:
-            words.insert(0, "clock set; the model goes on")
         if not words:  # what was asked for was so before
             return
         self._told = time.monotonic()

@@ -38,7 +38,7 @@ def normalised(readings):
     for stamp, *rows in zip(stamps.tolist(), strokes, joints, readings, strict=True):
         for stream, values in zip(RECORDED, rows, strict=True):
             report = twin.update(Sample(stream, stamp, values))
-            own = [each for part in report.all for each in part.residuals if each.stream is Stream.IMU]
+            own = [each for each in report.residuals if each.stream is Stream.IMU]
             found += [each.normalised[0] for each in own if (each.stamp - stamps[0]) * NANO > ONSET]
     return float(np.sqrt(np.nanmean(np.square(found))))
 
