@@ -30,13 +30,17 @@ def run(args: Namespace) -> int:
     folder = cache_folder()
     if (fault := fault_of(folder)) is not None:
         raise UsageError(f"compiled kernels cannot be kept: {fault}")
+    from ..config.settings import Settings
+    from ..messages.report_encoder import ReportEncoder
     from ..scene.load import load_scene
     from ..twin.twin import Twin
 
     before, began = len(list(folder.glob(f"*{SUFFIX}"))), time.perf_counter()
     if not before:
         tell("compiling the kernels of node, replay and statics with numba, one at a time: 40 s to some minutes ..")
-    Twin(load_scene(), health=True).warm_up()
+    scene = load_scene()
+    Twin(scene, health=True).warm_up()
+    ReportEncoder(scene, Settings())  # compiles the kernel of its numbers
     kernels = len(list(folder.glob(f"*{SUFFIX}")))
     told = f"{kernels - before} compiled now" if kernels > before else "nothing to compile"
     print(f"{kernels} kernels in {folder}, {_size(folder):.1f} MB; {told}, {time.perf_counter() - began:.1f} s")

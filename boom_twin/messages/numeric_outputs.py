@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..deviation.estimate_row import FORCE_VARIANCE, MODES
+from ..kernels.jit import SameTypes
+from ..kernels.tip_joints import write_derived
 from ..predictions import Estimate, Prediction
 from ..twin.blocks import EstimateBlock, Integers, PredictionBlock, row_of
 from ..types import Array
@@ -116,14 +118,14 @@ def selection(names: Sequence[str], joints: int) -> tuple[Integers, Array]:
     return chosen, np.array([-1.0 if name.startswith("-") else 1.0 for name in names])
 
 
-AXES = np.array([1.0, 1j])  # of the plane of complex numbers: x forward, y up
-
-
 class Chain(NamedTuple):
     """Geometry of the boom: pivot of its first joint, shape (2,), m, and lengths of its sections, shape (n,), m."""
 
     pivot: Array
     lengths: Array
+
+
+_DERIVE = SameTypes(write_derived)
 
 
 def number_rows(chain: Chain, p: Prediction | PredictionBlock | None, e: Estimate | EstimateBlock | None, count: int) -> Array:
@@ -137,17 +139,10 @@ def number_rows(chain: Chain, p: Prediction | PredictionBlock | None, e: Estimat
         numbers[:, 6:8], numbers[:, 8] = p.tip_acceleration, p.tip_angular_acceleration
         numbers[:, 9:JOINTS], numbers[:, JOINTS : JOINTS + joints] = p.tip_displacement, p.joints
         numbers[:, at - 2 * joints : at - joints], numbers[:, at - joints : at] = p.strokes, p.cylinder_forces
-        numbers[:, at : at + 3] = _tip_joints(chain, p)
     if e is not None:
         rows = e.rows if isinstance(e, EstimateBlock) else row_of(e)[np.newaxis]
         numbers[:, at + 3 : -2] = rows[:, :FORCE_VARIANCE]
-        half = 0.5 * rows[:, 2]
-        numbers[:, -2], numbers[:, -1] = np.sin(half), np.cos(half)
+    _DERIVE(chain.pivot, chain.lengths, numbers, JOINTS, at)
+    derived = numbers[:, at : at + 3]
+    derived[np.isnan(derived)] = math.nan  # the processor decides which of two NaN a sum has
     return numbers
-
-
-def _tip_joints(chain: Chain, p: Prediction | PredictionBlock) -> Array:
-    """Return the tip's place along and across the last section (m) and its turn (rad), against rigid sections, (.., 3)."""
-    turns = np.exp(1j * np.cumsum(p.joints, axis=-1))
-    off = ((p.tip_position - chain.pivot) @ AXES - turns @ chain.lengths) / turns[..., -1]
-    return np.stack([off.real, off.imag, p.tip_angle - p.joints.sum(axis=-1)], axis=-1)

@@ -217,8 +217,9 @@ class ReportEncoder:
         self._channels = channels_of(count)
         self._residuals: dict[tuple[str, ...], Template] = {}
         self._markers = ShapeMarkers(settings.exaggeration, settings.force_scale, frame)
-        for output in Output:  # encoders are compiled here, not when the first message waits
+        for output in Output:  # encoders and the kernel are compiled here, not when the first message waits
             jazzy().get_msgdef(type_of(output))
+        number_rows(self._chain, None, None, 1)
 
     def fill(self, report: Report, is_wanted: Callable[[Output], bool] = lambda output: True) -> Messages:
         """Return the wanted messages of one report; by default all.
@@ -285,8 +286,8 @@ class ReportEncoder:
     def _shaped_joint_states(self, stamps: Integers, numbers: Array) -> Bytes:
         """Return joint states with passive joints, which come with a shape, from numbers, shape (k, all)."""
         joints = numbers[:, JOINTS : JOINTS + len(self._chain.lengths)]
-        doubles = np.concatenate([numbers[:, self._joints], self._passive.positions(joints)], axis=1)
-        return self._shaped_joints.fill(stamps, doubles)[0]
+        passive = np.array([self._passive.positions(row) for row in joints]).reshape(len(stamps), len(self._passive.names))
+        return self._shaped_joints.fill(stamps, np.concatenate([numbers[:, self._joints], passive], axis=1))[0]
 
     def _residual_rows(self, residuals: ResidualBlock) -> Iterator[tuple[Integers, Bytes]]:
         """Yield rows of the block and their messages of residuals, one stream after the other."""
