@@ -2,8 +2,7 @@
 
 The boom linearised at rest is solved at every frequency by the complex sweeps of `kernels.transfer.vibration`; no
 natural mode is left out. A flexible part bends in at least `SHAPES` shapes, however few the scene has `modes`: so many that up
-to 30 Hz more change nothing (see `with_all_shapes`). Pins with clearance are linearised where their journals rest: tangent of
-the contact's force at the static penetration, and its damping.
+to 30 Hz more change nothing (see `with_all_shapes`). All pins are ideal.
 """
 
 from __future__ import annotations
@@ -17,9 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..compiler.plan import Plan
 from ..errors import SolverError, UsageError
-from ..kernels.elements.pin_contact import CLOSED
-from ..kernels.tables import BEAM, JOINT_A, JOINT_B, OK, SENTENCES, Z_SECTION, Motion, State, Tables, Work, complex_scratch
-from ..kernels.transfer.clearance_pins import load_pins
+from ..kernels.tables import BEAM, JOINT_A, JOINT_B, OK, SENTENCES, Z_SECTION, Tables, complex_scratch
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.vibration import TIP_FORCE, harmonic_response
 from ..scene.load import SceneSource, as_scene
@@ -31,7 +28,6 @@ from .equilibrium import rest_at, strokes_and_angles
 from .modal import drive_at_rest
 
 SHAPES = 5  # least number of shapes in which a flexible part bends, see `with_all_shapes`
-SMALL = np.array([1.0, 1e-6])  # N, m of a drive: loads that leave the tangents as they are, see `harmonic_response`
 UPWARD = (0.0, 1.0)  # N
 
 
@@ -119,45 +115,19 @@ def with_all_shapes(scene: Scene) -> Scene:
     return scene.model_copy(update={"sections": sections})
 
 
-def pins_at_rest(plan: Plan, state: State, work: Work) -> Array:
-    """Return forces and tangents of pins with clearance at rest, and their derivative by the rate s of motion, stacked.
-
-    Each is (pins, columns), see `Work.hold`. UsageError if a pin does not answer in proportion.
-    """
-    for name, row, memory in zip(plan.pins, plan.tables.clearances, state.contacts, strict=True):
-        if row.linear:
-            raise UsageError(
-                f"clearance.treatment = spring-damper: the spring in {name} turns with the body that it is fixed to, which the "
-                "tangents of a frequency response leave out. Set treatment: contact, which answers in proportion at rest."
-            )
-        if row.friction > 0.0:
-            raise UsageError(
-                f"clearance.contact.friction = {row.friction:g} in {name}: a journal that sticks and slides does not answer in "
-                "proportion, so there is no frequency response. Set friction: 0, or simulate."
-            )
-        if not memory[CLOSED]:
-            raise UsageError(
-                f"{name} bears no force here: its journal hangs free in the clearance of {row.gap:g} m and does not answer in "
-                "proportion, so there is no frequency response. Choose another posture, leave the pin out, or simulate."
-            )
-    found = []
-    for rate in (0.0, 1.0):
-        load_pins(plan.tables, state, work, Motion(0.0, rate, work.position, -rate * work.position))
-        found.append(work.hold.copy())
-    return np.array([found[0], found[1] - found[0]])
-
-
 class LinearisedBoom:
     """A boom at rest at absolute `strokes` (m), next to the joint `angles` (rad), both (n,), for harmonic loads.
 
-    SolverError if there is no equilibrium, UsageError for a pin that does not answer in proportion, see `pins_at_rest`.
+    SolverError if there is no equilibrium, UsageError for pins with clearance, which do not answer in proportion.
     """
 
     def __init__(self, scene: Scene, strokes: Array, angles: Array) -> None:
         self.plan, self._state, work = rest_at(with_all_shapes(scene), strokes, angles)
+        if self.plan.pins:
+            told = f"clearance.pins = {', '.join(self.plan.pins)}: a boom with play in its pins does not answer in proportion"
+            raise UsageError(f"{told}, so it has no frequency response. Leave the block clearance out, or simulate.")
         self.stations = stations(scene)
         place(self.plan.tables, self._state, work)
-        self._pins = pins_at_rest(self.plan, self._state, work)
         self._drive = drive_at_rest(self.plan, self._state, work)
         stretches = work.position[self.plan.tables.cylinders.history] - self._drive
         self._tables, self._gains, self._lags = with_oil_at_rest(self.plan, self._drive, stretches)
@@ -174,7 +144,7 @@ class LinearisedBoom:
         rates = 2j * math.pi * np.asarray(frequencies, float)
         damped = np.outer(rates, self._lags)
         every[:, TIP_FORCE:] *= (self._gains + damped) / (1.0 + damped)
-        increments, tip = self._linear_increments(rates, every)
+        increments, tip = self._increments(rates, every)
         return FrequencyResponse(
             frequencies=np.asarray(frequencies, float),
             tip=tip[:, :2],
@@ -184,28 +154,18 @@ class LinearisedBoom:
             stations=self.stations,
         )
 
-    def _linear_increments(self, rates: ComplexArray, loads: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return `_increments` under `loads`, solved at the size of load that is best for `harmonic_response`."""
-        large = 1e4  # times a load of 1 N or 1 m: static forces and lengths are rounded to 1e-16 of themselves
-        if not self.plan.pins:
-            increments, tip = self._increments(rates, large * loads)
-            return increments / large, tip / large
-        limits = np.repeat(SMALL, (int(TIP_FORCE), self.plan.joints))
-        sizes = np.abs(loads / limits).max(axis=1, keepdims=True)
-        sizes[sizes == 0.0] = 1.0
-        (forth, tip_forth), (back, tip_back) = (self._increments(rates, sign * loads / sizes) for sign in (1.0, -1.0))
-        return 0.5 * sizes * (forth - back), 0.5 * sizes * (tip_forth - tip_back)
-
     def _increments(self, rates: ComplexArray, loads: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """Amplitudes of the unknowns (k, unknowns) and of the tip (k, 3) under loads (k, 2 + n) at `rates` (k,), 1/s."""
+        large = 1e4  # times a load of 1 N or 1 m: static forces and lengths are rounded to 1e-16 of themselves
         increments = np.zeros((len(rates), len(self.plan.names)), complex)
         tip = np.zeros((len(rates), 3), complex)
-        status, row = harmonic_response(
-            self._tables, self._state, self._work, self._drive, rates, loads, self._pins, increments, tip
-        )
+        boom = self._tables, self._state, self._work, self._drive
+        status, row = harmonic_response(*boom, rates, large * loads, increments, tip)
         if status != OK:
             where = rates[row].imag / (2.0 * math.pi)
             raise SolverError(f"the response at {where:g} Hz cannot be computed: {SENTENCES[int(status)]}.")
+        increments /= large
+        tip /= large
         return increments, tip
 
     def load(self, tip_force: Sequence[float] = (0.0, 0.0), drive: int | None = None) -> ComplexArray:
@@ -259,7 +219,7 @@ def frequency_response(
     ------
     UsageError
         As `statics` does; frequencies that are negative or not finite; a force and a drive; a force of 0; a cylinder that is
-        not there; a pin with clearance that has friction, bears no force, or is treated as spring-damper.
+        not there; pins with clearance.
     SolverError
         No stable equilibrium was found.
 

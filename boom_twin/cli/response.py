@@ -263,10 +263,6 @@ def _map(scene: Scene, args: Namespace) -> Answer:
 def _large(scene: Scene, swing: float) -> tuple[str, ...]:
     """Return a warning if the swing is so large that the boom does not respond in proportion."""
     swing_share = 0.05  # of the reach: swings beyond are not in proportion to the load
-    swing_worn = 1e-4  # m, the same on pins with clearance
-    if scene.clearance is not None and scene.clearance.pins and swing > swing_worn:
-        told = f"the largest swing is {swing:.2g} m; beyond {swing_worn:g} m journals may roll in their bushes or leave them"
-        return (f"{told}, and a boom on pins with clearance does not answer in proportion. Simulate it",)
     if swing > swing_share * scene.reach:
         share = f"more than {swing_share:g} of the reach, beyond which no boom answers in proportion"
         return (f"the largest swing, {swing:.2g} m, is {share}",)

@@ -32,37 +32,28 @@ TIP_FORCE = np.int64(2)  # number of leading load entries for the tip force; the
 
 
 @kernel
-def harmonic_response(t, state, work, drive, rates, loads, pins, increments, tip):
-    """Write complex amplitudes of all unknowns and of the tip under harmonic loads about a state at rest.
+def harmonic_response(t, state, work, drive, rates, loads, increments, tip):
+    """Write complex amplitudes of all unknowns and of the tip under harmonic loads about a state at rest, with ideal pins.
 
-    With ideal pins the response is linear in the load; a large load reduces rounding by the static forces. With clearance the
-    tangents are recomputed under the load and depend on it. Use a load that is small against the static forces. The linear
-    response is half the difference between the responses to the load and to its opposite.
+    The response is linear in the load; a large load reduces rounding by the static forces.
 
     `state` is in equilibrium and placed in `work`, which `kernels.tables.complex_scratch` made. `drive` (n,) are its drive
     lengths, m; `rates` (k,) are s = i omega, 1/s; `loads` (k, 2 + n) the force at the tip in x and y (N), then the drive of
-    every cylinder (m). `pins` (2, pins, HOLD_COLUMNS) are `Work.hold` of the journals at rest, and its derivative by s.
-    `increments` (k, unknowns) and `tip` (k, 3), x, y (m) and orientation (rad), are written.
+    every cylinder (m). `increments` (k, unknowns) and `tip` (k, 3), x, y (m) and orientation (rad), are written.
 
     Return status and row: OK, or SINGULAR at `rates[row]`.
     """
     operations = t.operations.shape[0]
-    loaded = np.bool_(pins.shape[1] > 0)
     for k in range(rates.shape[0]):
         rate = rates[k]
         for i in range(work.position.shape[0]):
             work.offset[i] = -rate * work.position[i]
-        for i in range(pins.shape[1]):
-            for j in range(pins.shape[2]):
-                work.hold[i, j] = pins[0, i, j] + rate * pins[1, i, j]
-        put_load(work, drive, rate, loads[k], 0.0)
-        motion = Motion(rate * rate, rate, work.position, work.offset, RENEW)
-        status, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
-        if status != OK:
-            return status, k
-        put_load(work, drive, rate, loads[k], 1.0)
-        motion = Motion(rate * rate, rate, work.position, work.offset, loaded)
-        sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
+        for share in range(2):  # tangents without the load, because these include forces; then forces with it
+            put_load(work, drive, rate, loads[k], share)
+            motion = Motion(rate * rate, rate, work.position, work.offset, np.bool_(share == 0))
+            status, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE)
+            if status != OK:
+                return status, k
         sweep_out(t, state, work, ROOT, operations, FREE)
         for i in range(increments.shape[1]):
             increments[k, i] = work.dz[i]
@@ -73,7 +64,7 @@ def harmonic_response(t, state, work, drive, rates, loads, pins, increments, tip
 
 @inner
 def put_load(work, drive, rate, load, share):
-    """Set tip force and drives to `share` of a load; 0 for tangents, because these include forces."""
+    """Set tip force and drives to `share` of a load."""
     clear_cut(work, FREE)
     work.p[0], work.p[1] = -share * load[0], -share * load[1]
     for i in range(drive.shape[0]):
