@@ -118,26 +118,30 @@ def meaning_at(root: type[BaseModel], place: Place) -> str:
 # -- units -----------------------------------------------------------------------------------------------------------
 
 
-_FORCES = r"N m(?: s)?/rad|N(?: s)?/m|Pa"
-_STATED = re.compile(rf"(?:,| in) (m/s\^2|kg/m\^3|kg m\^2|kg/m|kg m|kg|{_FORCES}|m\^2|m\^3|m\^4|m|s|rad|degrees)(?![\w^/])")
-_TERM = r"[A-Za-zµμ°]+(?:(?:\^|\*\*)?-?[1-9]|[²³⁴])?"
-_QUANTITY = re.compile(rf"(?P<number>{NUMBER.pattern})\s*(?P<unit>{_TERM}(?:(?:\s*[*/·]\s*|\s+){_TERM})*)")
-_FACTOR = re.compile(r"(/?)[\s*·]*([A-Za-zµ°]+)(?:\^|\*\*)?(-?\d)?")
-_PLAIN = str.maketrans("²³⁴μ", "234µ")
-_DEGREE = (Decimal("0.01745329251994329576923690768"), (0, 0, 0, 1))
-_PREFIXES = {"": 0, "G": 9, "M": 6, "k": 3, "h": 2, "d": -1, "c": -2, "m": -3, "u": -6, "µ": -6, "n": -9}
-_BASES = {  # power of ten, and the exponents of m, kg, s and rad; an angle is no pure number
-    "m": (0, (1, 0, 0, 0)), "g": (-3, (0, 1, 0, 0)), "s": (0, (0, 0, 1, 0)), "rad": (0, (0, 0, 0, 1)),
-    "N": (0, (1, 1, -2, 0)), "Pa": (0, (-1, 1, -2, 0)), "bar": (5, (-1, 1, -2, 0)),
-    "l": (-3, (3, 0, 0, 0)), "L": (-3, (3, 0, 0, 0)),
-}  # fmt: skip
-UNITS = {  # factor to m, kg, s and rad, and their exponents
-    "t": (Decimal(1000), (0, 1, 0, 0)), "min": (Decimal(60), (0, 0, 1, 0)), "in": (Decimal("0.0254"), (1, 0, 0, 0)),
-    "ft": (Decimal("0.3048"), (1, 0, 0, 0)), "lb": (Decimal("0.45359237"), (0, 1, 0, 0)),
-    "lbf": (Decimal("4.4482216152605"), (1, 1, -2, 0)), "psi": (Decimal("6894.757293168361336722673"), (-1, 1, -2, 0)),
-    **dict.fromkeys(("deg", "degree", "degrees", "°"), _DEGREE),
-    **{p + base: (Decimal(10) ** (n + k), powers) for p, n in _PREFIXES.items() for base, (k, powers) in _BASES.items()},
-}  # fmt: skip
+_DEGREE, _RADIAN = "0.01745329251994329576923690768", "57.29577951308232087679815481"
+UNITS: dict[str, dict[str, str]] = {
+    "m": {"mm": "1e-3", "cm": "1e-2", "dm": "0.1", "km": "1e3", "in": "0.0254", "ft": "0.3048"},
+    "m^2": {"mm2": "1e-6", "cm2": "1e-4"},
+    "m^3": {"mm3": "1e-9", "cm3": "1e-6", "dm3": "1e-3", "l": "1e-3", "L": "1e-3", "ml": "1e-6"},
+    "m^4": {"mm4": "1e-12", "cm4": "1e-8"},
+    "kg": {"g": "1e-3", "t": "1e3", "lb": "0.45359237"},
+    "kg/m": {"kg/mm": "1e3", "g/mm": "1", "t/m": "1e3"},
+    "kg/m^3": {"g/cm3": "1e3", "kg/dm3": "1e3", "kg/l": "1e3", "t/m3": "1e3"},
+    "kg m": {"kg cm": "1e-2", "kg mm": "1e-3", "t m": "1e3"},
+    "kg m^2": {"kg cm2": "1e-4", "kg mm2": "1e-6", "t m2": "1e3"},
+    "N/m": {"kN/m": "1e3", "MN/m": "1e6", "N/mm": "1e3", "kN/mm": "1e6", "kN/cm": "1e5", "daN/mm": "1e4"},
+    "N s/m": {"kN s/m": "1e3", "N s/mm": "1e3", "kN s/mm": "1e6"},
+    "N m/rad": {"kN m/rad": "1e3", "MN m/rad": "1e6", "N m/deg": _RADIAN, "kN m/deg": f"{_RADIAN}e3"},
+    "N m s/rad": {"kN m s/rad": "1e3", "MN m s/rad": "1e6"},
+    "Pa": {"kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "N/mm2": "1e6", "bar": "1e5", "psi": "6894.757293168361336722673"},
+    "m/s^2": {"mm/s2": "1e-3", "cm/s2": "1e-2"},
+    "s": {"us": "1e-6", "ms": "1e-3", "min": "60"},
+    "rad": {"mrad": "1e-3", "deg": _DEGREE, "degrees": _DEGREE, "°": _DEGREE},
+    "degrees": {"deg": "1", "degree": "1", "°": "1", "rad": _RADIAN},
+}
+"""Units that a value may have instead of the stated one, and their sizes in that."""
+_STATED = re.compile(rf"(?:,| in) ({'|'.join(map(re.escape, sorted(UNITS, key=len, reverse=True)))})(?![\w^/])")
+_QUANTITY = re.compile(rf"(?P<number>{NUMBER.pattern})\s*(?P<unit>[A-Za-zµ°][\w\s/*^·²³⁴°]*)")
 
 
 def unit_of(meaning: str) -> str | None:
@@ -159,34 +163,25 @@ def converted(value: Any, unit: str | None) -> Any:
 def quantity(text: str, unit: str | None) -> float | str | None:
     """Return a number with a unit as a number in `unit`, or why it cannot be one; None for any other text."""
     text = text.strip()
-    if (
-        len(text) > LONGEST_WITH_UNIT or NUMBER.fullmatch(text) or not (found := _QUANTITY.fullmatch(text))
-    ):  # e-3 could be a unit
+    found = None if len(text) > LONGEST_WITH_UNIT or NUMBER.fullmatch(text) else _QUANTITY.fullmatch(text)
+    if found is None:
         return None
     number, name = found["number"], found["unit"]
     if unit is None:
         return f"a number without a unit is needed, and this one has `{name}`"
-    own, wanted = _unit(name), _unit(unit)
-    if own is None or wanted is None:
-        return f"`{name}` is no unit that is known"
-    if own[1] != wanted[1]:
-        return f"`{name}` is no unit of this key, which is in {unit}"
+    known = UNITS[unit] | {_spelling(unit): "1"}
+    if (factor := known.get(_spelling(name))) is None:
+        return f"`{name}` is no unit of this key, which is in {unit}; known are {', '.join(known)}"
     try:
-        return float(Decimal(number) * (own[0] / wanted[0]))
+        return float(Decimal(number) * Decimal(factor))
     except (ArithmeticError, ValueError):
         return f"`{number}` is no number that can be had in {unit}"
 
 
-def _unit(text: str) -> tuple[Decimal, list[int]] | None:
-    """Return the factor of a unit to m, kg, s and rad, and their exponents; None if a part of it is not known."""
-    total, sums = Decimal(1), [0, 0, 0, 0]
-    for slash, name, digits in _FACTOR.findall(text.translate(_PLAIN)):
-        if name not in UNITS:
-            return None
-        (factor, powers), exponent = UNITS[name], int(digits or 1) * (-1 if slash else 1)
-        total *= factor**exponent
-        sums = [s + exponent * p for s, p in zip(sums, powers, strict=True)]
-    return total, sums
+def _spelling(unit: str) -> str:
+    """Return a unit as `UNITS` spells it: ``kg cm2`` for ``kg·cm^2``."""
+    plain = unit.translate(str.maketrans("²³⁴μ", "234µ")).replace("**", "").replace("^", "")
+    return re.sub(r"\s*/\s*", "/", re.sub(r"[\s*·]+", " ", plain)).strip()
 
 
 # -- messages about refused values ------------------------------------------------------------------------------------

@@ -90,7 +90,7 @@ CLEARANCE = [
     ({"pins": [PIN, PIN]}, "pins[1].at", "clearance.pins[0] is this pin already", "once"),
     ({"pins": [PIN | {"radial_clearance": 0.03}]}, "pins[0].radial_clearance", "0.03", "less than pin_radius = 0.03 m",
      "metres"),
-    ({"pins": [PIN | {"radial_clearance": "0.1 mn"}]}, "pins[0].radial_clearance", "`mn` is no unit that is known",
+    ({"pins": [PIN | {"radial_clearance": "0.1 mn"}]}, "pins[0].radial_clearance", "`mn` is no unit of this key",
      "less that of the pin, m"),
     ({"pins": [PIN | {"clearance": 0.0001}]}, "pins[0].clearance", "unknown key", "`radial_clearance`"),
     ({"pins": "cylinder_1.rod"}, "pins", "a list is needed, not text", "one block per pin"),

@@ -72,7 +72,7 @@ K = "joints[1].cylinder.k"
         ("base.stiffness", "5 kN/mm", ("`kN/mm` is no unit of this key, which is in N m/rad",)),
         ("material.nu", "0.3 mm", ("a number without a unit is needed",)),
         (K, "30 kg/mm", ("`kg/mm` is no unit of this key, which is in N/m", "Give the stiffness of the oil spring, N/m.")),
-        (K, "30 kN/mn", ("`kN/mn` is no unit that is known", "N/m")),
+        (K, "30 kN/mn", ("`kN/mn` is no unit of this key, which is in N/m; known are kN/m, MN/m, N/mm",)),
         (K, "1e999999999999999999999 kN/mm", ("is no number that can be had in N/m",)),
         (K, "30 kN/mm/mm**9", ("is no unit of this key",)),
         (K, "30 __import__('os')", ("a number is needed, not text",)),
