@@ -20,7 +20,7 @@ from .yaml_text import read_plain
 _GONE = ("jerk_density", "lag", "stroke_agility", "step", "look_step", "step_tip_error", "step_acceleration_error", "rho")
 RETIRED = dict.fromkeys(
     (*_GONE, "section_deviation"), "without effect since 0.2.0, whose filter adapts by itself: leave it out"
-) | dict.fromkeys(("false_alarms", "baseline"), "without effect since 0.2.0: leave it out")
+) | dict.fromkeys(("false_alarms", "baseline", "leap"), "without effect since 0.2.0: leave it out")
 """Parameters of earlier versions, and the remedy for each."""
 
 
@@ -191,7 +191,6 @@ class Settings(_Table):
     gap: float = setting(0.1, "s", LIMIT, "pause between strokes above which it is flagged", True)
     restart_gap: float = setting(5.0, "s", LIMIT, "pause above which the model restarts from rest", True)
     jump_back: float = setting(1.0, "s", LIMIT, "step back of a stamp below which the sample may be late", True)
-    leap: float = setting(3600.0, "s", LIMIT, "step of the first stamps of angles above which it is confirmed", True)
     exaggeration: float = setting(10.0, "1", POSITIVE, "factor of the displacements drawn large in ~/shape")
     tip_deviation: float = setting(0.005, "m", POSITIVE, "deviation of an angle, as it moves the tip, that is an alarm")
     force_deviation: float = setting(5e3, "N", POSITIVE, "deviation of a cylinder force that is an alarm")

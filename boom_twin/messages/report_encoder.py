@@ -17,7 +17,7 @@ from ..predictions import Estimate, Prediction
 from ..scene.kinematics import PassiveJoints
 from ..scene.schema import Scene
 from ..twin.blocks import STREAMS, EstimateBlock, Integers, PredictionBlock, ReportBlock, ResidualBlock
-from ..types import SECOND, Alarm, Array, Change, Health, Report, channels_of
+from ..types import SECOND, Alarm, Array, Change, Health, Report, channels_of, stream_of
 from .cdr_encoder import STAMP, Bytes, EncodedBlock, EncodedBlockBuilder, NumberFields, Template
 from .numeric_outputs import ESTIMATED, JOINTS, PREDICTED, Chain, Placer, number_rows, selection
 from .sample_decoder import stamp_of
@@ -190,7 +190,7 @@ def decode_changes(msg: Any) -> Change:
         Settings().tuned(settings)
     except UsageError as error:
         raise BagError(f"a message of changes cannot be used: {error}") from None
-    zeros = {name: value for name, value in values.items() if value != 0.0}
+    zeros = {name: value for name, value in values.items() if value != 0.0 and stream_of(name) is not None}
     return Change(stamp_of(msg), bool(from_rest), settings, zeros, from_rest == NEW)
 
 

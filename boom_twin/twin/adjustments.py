@@ -12,7 +12,7 @@ from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
 from ..errors import UsageError
 from ..scene.schema import Scene
-from ..types import GIVE, NANO, SECOND, SENSORS, Array, Change, Stream, StrokeReading
+from ..types import GIVE, SECOND, SENSORS, Array, Change, Stream, StrokeReading
 from .blocks import CODES
 from .state import COUNT, FIRST, NOISE_REACH, NONE, ZEROS, Limits, Ring, TwinState, zeros_at
 
@@ -33,7 +33,6 @@ def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Col
         counts[CODES[Stream.STROKES]] = 0
     return Limits(
         gap=round(settings.gap * SECOND),
-        leap=settings.leap / NANO,
         drive=CODES[reads.stream],
         far=far,
         rate=settings.rate(reads),

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types import NANO, Array
-from .state import CHECKED, EPOCH, IN_SLOT, NEWEST, OTHERS, TRUSTED, Limits, TwinState, reach_of_strokes
+from .state import CHECKED, IN_SLOT, NEWEST, NONE, OTHERS, TRUSTED, Limits, TwinState, reach_of_strokes
 from .update import matched
 
 MOST_DOUBTED = 5  # largest number of implausible readings in a row, without a jump, that are left out
 SILENT_AFTER = 100_000_000  # ns after which a missing stroke is reported
 BELIEVED_AFTER = 1_000_000_000  # ns after which the model restarts where a reading jumped and stayed
 USUAL_RATE = 0.1  # motion during a jump: at most this share of the maximum rate, plus twice the estimated rate
-NEVER = -1
 Flags = NDArray[np.bool_]
 
 
@@ -24,19 +23,14 @@ class Run:
     """State of the twin since the boom last started from rest, in addition to `TwinState`, and check of its drives."""
 
     def __init__(self, state: TwinState, stamp: int, is_again: bool) -> None:
-        self.is_again, self._state, self._clock = is_again, state, state.clock
+        self.start, self.is_again, self._state, self._clock = stamp, is_again, state, state.clock
         self.is_predicted = False
-        self._before = 0
-        self._jumped = np.zeros(0, np.int64)  # stamp (ns) of a stroke's jump; NEVER without one
-        state.clock[EPOCH] = state.clock[NEWEST] = stamp
+        self._before = NONE
+        self._jumped = np.zeros(0, np.int64)  # stamp (ns) of a stroke's jump; NONE without one
+        state.clock[NEWEST] = stamp
         state.clock[IN_SLOT] = -1
         state.interval[:] = 0.0
         state.past.bounds[:] = 0
-
-    @property
-    def epoch(self) -> int:
-        """Stamp (ns) of the start."""
-        return int(self._state.clock[EPOCH])
 
     @property
     def newest(self) -> int:
@@ -87,7 +81,7 @@ class Run:
         """
         if estimate is None:
             self._strange, self._seen = np.zeros(len(values), dtype=np.int64), np.full(len(values), stamp)
-            self._jumped = np.full(len(values), NEVER)
+            self._jumped = np.full(len(values), NONE)
             self._clock[CHECKED] = self._clock[TRUSTED] = stamp
             return values, []
         limit = self._limit(stamp, limits)
@@ -97,7 +91,7 @@ class Run:
             self._clock[TRUSTED] = stamp
             return values, []
         if self._clock[TRUSTED] > self._before:  # a regular sample came since the last irregular one
-            self._strange[:], self._seen[:], self._jumped[:] = 0, self._clock[TRUSTED], NEVER
+            self._strange[:], self._seen[:], self._jumped[:] = 0, self._clock[TRUSTED], NONE
         self._before = stamp
         step = values - before
         jumps, is_onward = np.abs(step) > limit, step * (before - estimate) > 0.0
@@ -110,25 +104,25 @@ class Run:
     @property
     def must_restart(self) -> bool:
         """Return True if a stroke stays where it jumped for `BELIEVED_AFTER`: no motion leads there."""
-        jumped = self._jumped != NEVER
+        jumped = self._jumped != NONE
         return bool(jumped.any() and (self._before - self._jumped[jumped]).max() >= BELIEVED_AFTER)
 
     def _gone(self, stamp: int, rates: Array) -> Array:
         """Return the distance of each reading at these `rates` since its jump, shape (n,)."""
-        elapsed = np.where(self._jumped == NEVER, 0, stamp - self._jumped) * NANO
+        elapsed = np.where(self._jumped == NONE, 0, stamp - self._jumped) * NANO
         return np.asarray(rates * elapsed)
 
     def _note_jumps(self, stamp: int, far: Flags, jumps: Flags, is_onward: Flags, returned: Flags) -> Flags:
         """Note strokes that jumped; return those that jumped back. A second jump onward is motion, sampled slowly."""
-        is_away = self._jumped != NEVER
+        is_away = self._jumped != NONE
         is_back: Flags = is_away & returned
         is_over = is_back | ~far | (is_away & jumps & is_onward)
-        self._jumped = np.where(is_over, NEVER, np.where(far & jumps, stamp, self._jumped))
+        self._jumped = np.where(is_over, NONE, np.where(far & jumps, stamp, self._jumped))
         return is_back
 
     def _doubted(self, stamp: int, values: Array, far: Flags) -> tuple[Array, list[str]]:
         self._strange = np.where(far, self._strange + 1, np.where(np.isnan(values), self._strange, 0))
-        implausible = far & ((self._strange <= MOST_DOUBTED) | (self._jumped != NEVER))
+        implausible = far & ((self._strange <= MOST_DOUBTED) | (self._jumped != NONE))
         taken = np.where(implausible, np.nan, values)
         self._strange[far & ~implausible] = 0
         self._seen = np.where(np.isfinite(taken), stamp, self._seen)

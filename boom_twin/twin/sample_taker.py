@@ -1,4 +1,4 @@
-"""Take the samples of a twin one by one: follow, refuse or hold them, start and restart the model, change it between them."""
+"""Take the samples of a twin one by one: follow or refuse them, start and restart the model, change it between them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,19 @@ from .blocks import CODES, REGULAR, Note, ReportBlock, SampleBlock
 from .run import Run
 from .sample_check import SampleCheck
 from .stamp_check import StampCheck, verdict_on
-from .state import FOLLOWER_ROOM, NEWEST, NONE, ROOM, SHORTEST_STEP, STATUS, UNMATCHED, drop_waiting, near, new_state
+from .state import (
+    FOLLOWER_ROOM,
+    NEWEST,
+    NONE,
+    ROOM,
+    SHORTEST_STEP,
+    STATUS,
+    UNMATCHED,
+    drop_waiting,
+    near,
+    new_state,
+    note_stamp,
+)
 from .update import DONE, FAILED
 
 
@@ -96,7 +108,7 @@ class SampleTaker:
         self._run: Run | None = None
         self._is_new = True
         self._failed: int | None = None
-        self._lines = self._new_lines()
+        self._line = StampCheck(self.settings, self._state, CODES[self._drive])
         self._zeros = SensorZeros(self._state, self._channels, self._drive)
         self._recent = ResidualBuffer(self._state.recent, self._channels)
 
@@ -114,11 +126,9 @@ class SampleTaker:
 
     def _restart(self) -> None:
         self._begin_anew()
-        self._lines = self._new_lines()
+        self._line = StampCheck(self.settings, self._state, CODES[self._drive])
+        self._state.newest[:], self._state.usual[:] = NONE, 0.0
         self._state.waiting.bounds[:] = 0
-
-    def _new_lines(self) -> dict[Stream, StampCheck]:
-        return {stream: StampCheck(self.settings, self._state, CODES[stream]) for stream in Stream}
 
     def _make_model(self) -> None:
         """Make the parts of the model that depend on the load."""
@@ -147,8 +157,7 @@ class SampleTaker:
         if before.limits != self.settings.limits:
             events.append("limits")
             self._compiled.limits = limits_of(self.scene, self._boom, self.settings, self.absent, self.reads)
-            for line in self._lines.values():
-                line.tune(self.settings)
+            self._line.tune(self.settings)
         if asked.zeros != self._zeros.values:
             events.append("zero")
             from_rest |= self._zeros.put(stamp, asked.zeros)
@@ -197,11 +206,11 @@ class SampleTaker:
         return self._take_measured(sample, complete)
 
     def _take_strokes(self, sample: Sample, complete: bool) -> ReportBlock:
-        line, run, values = self._lines[self._drive], self._run, self._zeroed(sample)
+        line, run, values = self._line, self._run, self._zeroed(sample)
         if run is None:
             return self._follow(sample, values, complete, [])
         if line.is_next(sample.stamp) and sample.stamp - run.newest >= SHORTEST_STEP:
-            if run.is_of_others(sample.stamp - run.epoch, values, self._boom.expected(values), self._compiled.limits):
+            if run.is_of_others(sample.stamp, values, self._boom.expected(values), self._compiled.limits):
                 return self._refuse(sample, "implausible")
             return self._follow(sample, values, complete, [])
         verdict = verdict_on(sample, values, line, run, self._boom, self._compiled.limits, self.settings)
@@ -259,10 +268,10 @@ class SampleTaker:
         return self._step(self._run, sample, events)
 
     def _step(self, run: Run, sample: Sample, events: list[str]) -> ReportBlock:
-        self._lines[self._drive].take(sample.stamp)
+        self._line.take(sample.stamp)
         estimate = self._boom.expected(sample.values) if run.is_predicted else None
         before, rates = self._state.strokes, self._boom.speeds
-        taken, oddities = run.checked(sample.stamp - run.epoch, sample.values, before, estimate, rates, self._compiled.limits)
+        taken, oddities = run.checked(sample.stamp, sample.values, before, estimate, rates, self._compiled.limits)
         if run.must_restart and np.isfinite(sample.values).all():
             self._begin_anew_at(sample.stamp)
             return self._follow(sample, sample.values, True, [*events, "stroke elsewhere"])
@@ -282,23 +291,19 @@ class SampleTaker:
     # -- measured angles and accelerations ----------------------------------------------------------------------------
 
     def _take_measured(self, sample: Sample, complete: bool) -> ReportBlock:
-        line = self._lines[sample.stream]
-        longest = line.longest if line.usual else self.settings.leap / NANO
-        if line.newest is None or 0 < sample.stamp - line.newest <= longest:
-            return self._compare(sample, complete)
-        span = (sample.stamp - line.newest) * NANO
+        state, stream, run = self._state, CODES[sample.stream], self._run
+        span = 1.0 if state.newest[stream] == NONE else (sample.stamp - int(state.newest[stream])) * NANO
         if -self.settings.jump_back <= span <= 0.0:
             return self._refuse(sample, "duplicate" if span == 0.0 else "late")
-        line.note(sample)
-        if not line.is_confirmed():
-            return self._refuse(sample, "second source" if line.is_second else "leap", is_noted=True)
-        # stamps of a looped bag come again
-        gone = drop_waiting(self._state, line.change_over(), -NONE, CODES[sample.stream])
-        self._state.clock[UNMATCHED] += gone
+        if run is not None and abs(sample.stamp - run.newest) * NANO > self.settings.restart_gap:
+            return self._refuse(sample, "leap")  # no strokes come at that time
+        if span < 0.0:  # time was set back, as in a looped bag: what waits is of the time before
+            state.clock[UNMATCHED] += drop_waiting(state, sample.stamp, -NONE, stream)
+            state.newest[stream] = NONE
         return self._compare(sample, complete)
 
     def _compare(self, sample: Sample, complete: bool) -> ReportBlock:
-        self._lines[sample.stream].take(sample.stamp)
+        note_stamp(self._state, CODES[sample.stream], sample.stamp)
         events: tuple[str, ...] = ()
         if not complete:
             events = ("partial",)

@@ -1,4 +1,4 @@
-"""Check the stamps of a stream: tell regular samples from stray ones, pauses, a time that was set back, and a second source.
+"""Check the stamps of strokes: tell regular samples from stray ones, pauses, a time that was set back, and a second source.
 
 `StampCheck` follows one line of stamps and notes another one beside it. `event_of` decides on a stroke sample that is not the
 next one of its line: follow it, refuse it, or continue with the other line.
@@ -14,7 +14,7 @@ from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
 from ..types import NANO, SECOND, Array, Sample
 from .run import Run
-from .state import NONE, SHORTEST_STEP, USUAL_STEP, Limits, TwinState, is_next, longest_step, note_stamp
+from .state import BESIDE, NONE, SHORTEST_STEP, USUAL_STEP, Limits, TwinState, is_next, longest_step, note_stamp
 
 EARLY_STEP = 8.0  # usual intervals, longest step ahead that is accepted at once if the strokes are as expected
 SECOND_LINE = 1_000_000_000  # ns after a stray stamp in which another line must be confirmed for the setting `gap`
@@ -33,13 +33,11 @@ class StampCheck:
 
     def __init__(self, settings: Settings, state: TwinState, stream: int) -> None:
         self._state, self._stream = state, stream
-        self._state.usual[stream] = 0.0
         self.is_second = False
         self._first = 0  # stamp with which the other line began
         self._other: Sample | None = None  # newest sample of the other line
         self._strayed: int | None = None
-        self._state.beside[stream] = 0
-        self._state.newest[stream] = NONE
+        self._state.clock[BESIDE] = 0
         self.tune(settings)
 
     @property
@@ -73,19 +71,19 @@ class StampCheck:
     def take(self, stamp: int) -> None:
         """Take this stamp as the newest of the line; those beside it were stray."""
         note_stamp(self._state, self._stream, stamp)
-        if self._state.beside[self._stream]:
-            self._state.beside[self._stream], self._strayed = 0, stamp
+        if self._state.clock[BESIDE]:
+            self._state.clock[BESIDE], self._strayed = 0, stamp
 
-    def note(self, sample: Sample, limits: Limits | None = None) -> None:
-        """Note a sample beside the line. With `limits`, strokes out of a cylinder's reach begin a line of their own."""
-        other, is_open = self._other, bool(self._state.beside[self._stream])
+    def note(self, sample: Sample, limits: Limits) -> None:
+        """Note a sample beside the line. Strokes out of a cylinder's reach from those before begin a line of their own."""
+        other, is_open = self._other, bool(self._state.clock[BESIDE])
         follows = other is not None and 0 < sample.stamp - other.stamp <= self.longest
-        if follows and is_open and limits is not None and other is not None:
+        if follows and is_open and other is not None:
             reach = limits.far + limits.rate * (sample.stamp - other.stamp) * NANO
             follows = _largest_difference(sample.values, other.values) <= reach
         if not (is_open and follows):
             self._first, self.is_second = sample.stamp, follows
-        self._other, self._state.beside[self._stream] = sample, 1
+        self._other, self._state.clock[BESIDE] = sample, 1
 
     def is_confirmed(self, least: float = 0.0) -> bool:
         """Return True if the other line spans `least` ns (after a recent stray stamp: `gap`), and about a usual interval."""
@@ -95,13 +93,12 @@ class StampCheck:
         span = self._other.stamp - self._first
         return span > 0 and span >= max(self.usual / USUAL_STEP, least)
 
-    def change_over(self) -> int:
-        """Follow the other line from now on; return the stamp (ns) with which it began."""
+    def change_over(self) -> None:
+        """Follow the other line from now on."""
         assert self._other is not None
         before, self._state.newest[self._stream] = self.newest, NONE
         self._other = None if before is None else Sample(self._other.stream, before, self._other.values)
-        self._state.beside[self._stream] = 0
-        return self._first
+        self._state.clock[BESIDE] = 0
 
 
 # -- strokes whose stamp is not the next one -----------------------------------------------------------------------------
@@ -155,7 +152,7 @@ def verdict_on(
     reach = limits.far + limits.rate * abs(span) * NANO
     if 0.0 < span * NANO <= settings.restart_gap and _largest_difference(values, boom.extrapolated(0.0)) <= reach:
         return Verdict("gap", is_followed=True)
-    is_recent = run.is_again and run.newest - run.epoch < SECOND
+    is_recent = run.is_again and run.newest - run.start < SECOND
     is_in_time = 0 < span <= limits.gap  # no pause: all strokes jumped at once
     if not line.is_confirmed(SECOND if is_recent or is_in_time or line.is_second else limits.gap):
         return Verdict(event, is_noted=True)

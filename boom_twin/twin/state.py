@@ -24,7 +24,7 @@ WAITING = 4096  # most samples that wait for a stroke
 ZEROS = 16  # sets of zeros that late samples may still need
 SLOT = 100_000_000  # ns; the first prediction in each has an outline, and health is judged with it
 
-EPOCH, NEWEST, CHECKED, TRUSTED, OTHERS, IN_SLOT, UNMATCHED, STATUS, BEGINS_SLOT, IS_DEFLECTED = range(10)  # of `clock`
+NEWEST, CHECKED, TRUSTED, OTHERS, BESIDE, IN_SLOT, UNMATCHED, STATUS, BEGINS_SLOT, IS_DEFLECTED = range(10)  # of `clock`
 FIRST, COUNT = range(2)  # of a ring
 
 
@@ -59,11 +59,10 @@ class Ring(NamedTuple):
 class TwinState(NamedTuple):
     """State of the twin between samples, beside the boom; s streams of up to w channels, c measured channels in all."""
 
-    clock: Integers  # (10,), whole numbers by the names above; stamps in ns, CHECKED and TRUSTED since EPOCH
+    clock: Integers  # (10,), whole numbers by the names above; stamps in ns
     interval: Array  # (1,), running mean of the time between strokes, s; 0 while unknown
     newest: Integers  # (s,), stamp of the newest sample of every stream, ns; NONE before the first
     usual: Array  # (s,), time from one sample to the next, ns; 0 while unknown
-    beside: Integers  # (s,), 1 if the newest stamp was of another line, see `boom_twin.twin.stamp_check`
     strokes: Array  # (n,), newest strokes or angles that drive the model, less their zeros, m or rad; NaN where missing
     taken: Array  # (n,), the same as the model is to take them
     past: Ring  # expected readings (c,), their deviations and the strokes, of the last `SPAN`
@@ -79,7 +78,6 @@ class Limits(NamedTuple):
     """Limits that `update` checks samples against."""
 
     gap: int  # ns
-    leap: float  # ns
     drive: int  # code of the stream that drives the model, of strokes (m) or angles (rad)
     far: float  # by which its readings may be off their estimate at once
     rate: float  # of the fastest, per s
@@ -138,7 +136,7 @@ def new_state(joints: int, channels: Integers, room: Room) -> TwinState:
     streams, width, measured = len(channels), int(channels.max()), int(channels[1:].sum())
     return TwinState(
         clock=np.zeros(10, np.int64), interval=np.zeros(1),
-        newest=np.full(streams, NONE), usual=np.zeros(streams), beside=np.zeros(streams, np.int64),
+        newest=np.full(streams, NONE), usual=np.zeros(streams),
         strokes=np.zeros(joints), taken=np.zeros(joints),
         past=new_ring(room.expected, measured, measured, joints), waiting=new_ring(WAITING, width),
         recent=new_ring(room.recent, width),
@@ -226,13 +224,12 @@ def reach_of_strokes(far, rate, span):
 def are_strokes_regular(estimates, limits, state, stamp, values):
     """Return True if strokes, or angles that drive the model, are on time, complete and within reach; write them to `state`."""
     drive = limits.drive
-    if state.beside[drive] or stamp - state.clock[NEWEST] < SHORTEST_STEP or state.newest[drive] == NONE:
+    if state.clock[BESIDE] or stamp - state.clock[NEWEST] < SHORTEST_STEP or state.newest[drive] == NONE:
         return False
     if not is_next(state.newest[drive], state.usual[drive], limits.gap, stamp):
         return False
     zeros = zeros_at(state, stamp)
-    time = stamp - state.clock[EPOCH]
-    limit = reach_of_strokes(limits.far, limits.rate, time - state.clock[CHECKED])
+    limit = reach_of_strokes(limits.far, limits.rate, stamp - state.clock[CHECKED])
     for i in range(state.strokes.shape[0]):
         value = near(values[i] - state.zeros[zeros, drive, i], estimates[i, 0], limits.turns[i])
         if not abs(values[i]) <= LIMIT or not limits.shortest[i] <= value <= limits.longest[i]:
@@ -242,7 +239,7 @@ def are_strokes_regular(estimates, limits, state, stamp, values):
     for i in range(state.strokes.shape[0]):
         state.strokes[i] = near(values[i] - state.zeros[zeros, drive, i], estimates[i, 0], limits.turns[i])
         state.taken[i] = state.strokes[i]
-    state.clock[CHECKED], state.clock[TRUSTED], state.clock[OTHERS] = time, time, 0
+    state.clock[CHECKED], state.clock[TRUSTED], state.clock[OTHERS] = stamp, stamp, 0
     return True
 
 
@@ -255,14 +252,8 @@ def near(value, estimate, turns):
 @inner
 def is_regular(limits, state, stream, stamp, values):
     """Return True if a measured sample is on time and complete."""
-    most = limits.leap
-    if state.usual[stream] != 0.0:
-        most = longest_step(state.usual[stream], limits.gap)
-    if (
-        limits.channels[stream] == 0
-        or state.beside[stream]
-        or (state.newest[stream] != NONE and not 0 < stamp - state.newest[stream] <= most)
-    ):
+    most, newest = longest_step(state.usual[stream], limits.gap), state.newest[stream]
+    if limits.channels[stream] == 0 or (newest != NONE and not 0 < stamp - newest <= most):
         return False
     complete = True
     for i in range(limits.channels[stream]):

@@ -64,6 +64,12 @@ BEGINNINGS: dict[str, tuple[list, list, list]] = {
 }
 
 
+def test_a_setting_of_an_earlier_version_is_no_zero_of_a_sensor() -> None:
+    change = Change(1, True, Settings().live, {"joint_1": 0.01})
+    msg = jazzy().deserialize_cdr(encode_changes(replace(change, zeros={**change.zeros, "leap": 3600.0})), TYPE)
+    assert decode_changes(msg) == change
+
+
 @pytest.mark.parametrize("case", BEGINNINGS)
 def test_where_a_change_begins(case: str) -> None:
     logged, strokes, expected = BEGINNINGS[case]
