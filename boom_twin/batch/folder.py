@@ -172,7 +172,7 @@ def _digest(row: Row) -> str:
 
 
 _ALWAYS: dict[str, str] = {
-    "session": "string", "path": "string", "rig": "string", "status": "string", "reason": "string", "attempts": "int64",
+    "session": "string", "path": "string", "rig": "string", "status": "string", "reason": "string",
     "first_stamp_ns": "int64", "duration_s": "double", "samples": "int64", "dropped": "int64", "outside_validity": "int64",
     "wall_s": "double", "realtime_factor": "double", "peak_memory_bytes": "int64", "tip_acceleration_max_m_s2": "double",
     "joint_residual_rms_rad": "list", "joint_residual_normalised_mean": "list", "joint_residual_normalised_std": "list",
