@@ -65,9 +65,14 @@ class ReplayInputs:
     @property
     def expected(self) -> int:
         """Approximate number of messages to read."""
-        session = self.session
-        count = sum(map(session.count, self.wanted))
-        return round(count * self.window.share((session.end - session.start) * NANO))
+        count = sum(map(self.session.count, self.wanted))
+        return round(count * self.window.share((self.session.end - self.session.start) * NANO))
+
+    @property
+    def length(self) -> float:
+        """Length of what is read, s, by log times."""
+        whole = (self.session.end - self.session.start) * NANO
+        return whole * self.window.share(whole)
 
     @property
     def summary(self) -> dict[str, Any]:

@@ -52,6 +52,7 @@ class Stretch:
     samples: list[SampleBlock]  # read meanwhile
     reads: StrokeReading  # of the strokes of the predictions
     streams: Collection[Stream]  # of the session's sensors
+    length: float  # of the whole session, s, by its log times; 0 if it is not known
 
     @property
     def predictions(self) -> PredictionBlock:
@@ -137,8 +138,10 @@ class Recording:
         errors: TipErrors | None = None,
         reads: StrokeReading = StrokeReading.LENGTH,
         streams: Collection[Stream] = USUAL_STREAMS,
+        length: float = 0.0,
     ) -> None:
         self._joints, self._take, self._errors, self.reads, self._streams = joints, take, errors, reads, streams
+        self._length = length
         self._parts: list[ReportBlock] = []
         self._health: list[Health] = []
         self._samples: list[SampleBlock] = []
@@ -213,7 +216,7 @@ class Recording:
 
     def _stretch(self) -> Stretch | None:
         parts = [part for part in self._parts if len(part.predictions.stamps) or len(part.residuals.stamps)]
-        own = self._health, self.first, self._samples, self.reads, self._streams
+        own = self._health, self.first, self._samples, self.reads, self._streams, self._length
         return Stretch(self._joints, joined(parts), *own) if parts else None
 
     @property

@@ -200,7 +200,8 @@ def replay_into(
             take(stretch)
             spent += time.perf_counter() - began
 
-    recording = Recording(joints, None if take is None else timed, errors, given.strokes.reading, given.streams)
+    given_away = None if take is None else timed
+    recording = Recording(joints, given_away, errors, given.strokes.reading, given.streams, given.length)
     samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
     with ExitStack() as stack:
         twin, put = given.twin(options.causes), None
