@@ -6,7 +6,6 @@ import fcntl
 import glob
 import json
 import os
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
@@ -51,28 +50,15 @@ def _listed(file: Path) -> Iterator[Path]:
 
 
 def _matching(pattern: str) -> Iterator[Path]:
-    """Yield a path, or the sessions (folders and single files) that a glob fits."""
-    if not glob.has_magic(pattern) or Path(pattern).exists():
-        yield Path(pattern)
+    """Yield a path, or the sessions (folders and single files) that a glob fits. ``**`` does not follow links."""
+    path = Path(pattern)
+    if not glob.has_magic(pattern) or path.exists():
+        yield path
         return
-    found = [path for path in map(Path, sorted(_expanded(pattern))) if is_session(path)]
+    found = sorted(filter(is_session, Path(path.anchor).glob(str(path.relative_to(path.anchor)))))
     if not found:
         raise UsageError(f"{pattern}: fits no session, a folder of a rosbag2 or a file of a session. Check it, and quote it.")
     yield from found
-
-
-def _expanded(pattern: str) -> Iterator[str]:
-    """Yield the paths that a glob fits. ``**`` does not follow links, which may lead in a circle."""
-    before, *after = re.split(r"(?<![^/])\*\*(?![^/])", pattern, maxsplit=1)
-    if not after:
-        yield from glob.glob(pattern)
-        return
-    for top in glob.glob(before or "."):
-        if not after[0]:
-            yield top
-        for folder, inner, _ in os.walk(top):
-            inner[:] = [name for name in inner if not name.startswith(".")]
-            yield from _expanded(glob.escape(folder) + (after[0] or "/*"))
 
 
 def key_of(session: Path) -> str:

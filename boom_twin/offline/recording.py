@@ -22,7 +22,6 @@ from ..types import NANO, SENSORS, USUAL_STREAMS, Alarm, Array, Health, Stream, 
 from .ground_truth import TipErrors
 
 STRETCH = 2**14  # predictions in a stretch, at least: 82 s at 200 Hz, some 30 MB
-MOST_STEPS = 64  # different differences of readings; noise that is not read out in coarse steps has more
 
 
 class ResidualRows(NamedTuple):
@@ -98,27 +97,23 @@ class SessionTotals:
 
 
 class ReadOut:
-    """Steps in which sensors are read out, by the differences of successive readings."""
+    """Steps in which sensors are read out: the smallest change from one reading to the next of any sensor of a stream."""
 
     def __init__(self) -> None:
-        self._steps: dict[int, set[float]] = {}  # by the code of their stream
+        self._steps: dict[int, float] = {}  # by the code of their stream
 
     def add(self, samples: SampleBlock) -> None:
         """Add a block of samples."""
         for code in np.unique(samples.streams).tolist():
-            steps = self._steps.setdefault(code, set())
-            if len(steps) <= MOST_STEPS:
-                apart = np.abs(np.diff(samples.values[samples.streams == code], axis=0))
-                steps.update(np.unique(np.round(apart[apart > 0.0], 9)).tolist())
+            changes = np.abs(np.diff(samples.values[samples.streams == code], axis=0))
+            self._steps[code] = min(self._steps.get(code, np.inf), changes[changes > 1e-9].min(initial=np.inf))
 
     def coarse(self, settings: Settings) -> dict[str, list[str]]:
-        """Return a sentence for each stream with steps q where q^2 / 12 exceeds the stated variance s^2 + r^2 / 12."""
+        """Return a sentence for each stream with a step q where q^2 / 12 exceeds the stated variance s^2 + r^2 / 12."""
         found = []
-        for code, steps in self._steps.items():
-            kind, q = SENSORS[STREAMS[code]], min(steps, default=np.nan)
-            noise, stated = (getattr(settings, name) if name else np.inf for name in (kind.noise, kind.resolution))
-            is_even = len(steps) <= MOST_STEPS and all(abs(step / q - round(step / q)) < 1e-3 for step in steps)
-            if is_even and q**2 > 12.0 * noise**2 + stated**2:
+        for code, q in self._steps.items():
+            kind = SENSORS[STREAMS[code]]
+            if kind.resolution and np.isfinite(q) and q**2 > 12.0 * settings.variance(kind):
                 told = f"{kind.title}: readings come in steps of {q:g} (SI units): set {kind.resolution} to that"
                 found.append(f"{told}, or sensors look stuck or noisy")
         return {"read_out": found} if found else {}
