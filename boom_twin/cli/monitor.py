@@ -108,7 +108,7 @@ async def _serve(args: Namespace, feed: Feed) -> None:
     server = Server(feed, ViewerActions(feed, args.allow), access, webhook)
     try:
         async with serving(server, access, args.host, args.port) as address:
-            tell(f"open {address}   (Ctrl-C ends it)")
+            tell(f"open {address}   (Ctrl-C ends it)", is_kept=True)
             await stopped.wait()
     except OSError as error:
         raise BoomTwinError(f"cannot listen on {args.host}:{args.port}: {error.strerror}. Choose another --port.") from None

@@ -91,7 +91,7 @@ class StreamWatch:
         self._heard, self._looked_count, self._least, self.lag = self._monotonic(), self.count, nan, nan
         self._counted = nan, 0
         self._channels = [Channel(*bounds) for bounds in self._ranges]
-        self._samples: list[Sample] = []  # since the last look
+        self._samples: list[tuple[int, Array]] = []  # stamps (ns) and values since the last look
 
     def seen(self, stamp: int) -> None:
         self.count += 1
@@ -103,7 +103,7 @@ class StreamWatch:
 
     def took(self, sample: Sample) -> None:
         """Take the sample of a message. A refused message has none."""
-        self._samples.append(sample)
+        self._samples.append((sample.stamp, np.array(sample.values)))
 
     def age(self, now: float) -> float:
         """Return the time since the last message, or since listening began."""
@@ -125,8 +125,8 @@ class StreamWatch:
 
     def look(self, longest: float) -> list[ChannelStats]:
         """Return the statistics of every channel since the last look; `longest` (s) is the largest permitted step of stamps."""
-        stamps = np.array([sample.stamp for sample in self._samples], np.int64)
-        table = np.array([sample.values for sample in self._samples], float).reshape(len(stamps), len(self._ranges))
+        stamps = np.array([stamp for stamp, _ in self._samples], np.int64)
+        table = np.array([values for _, values in self._samples], float).reshape(len(stamps), len(self._ranges))
         self._samples = []
         refused = max(0, self.count - self._looked_count - len(stamps))
         self._looked_count = self.count

@@ -46,7 +46,8 @@ class TipTruth:
 class TipErrors:
     """Root mean square errors of predictions, and of the estimates beside them, that come in parts.
 
-    The first prediction of all is at the truth's first time.
+    The first prediction of all is at the truth's first time. Predictions outside the truth's times, as after a clock was set,
+    do not count.
     """
 
     def __init__(self, truth: TipTruth) -> None:
@@ -54,13 +55,14 @@ class TipErrors:
         self._first: int | None = None
         self._counts, self._squares = defaultdict[str, int](int), defaultdict[str, float](float)  # by names in ``summary.json``
 
-    def add(self, predictions: PredictionBlock, rows: slice, estimates: EstimateBlock) -> None:
-        """Add some rows of predictions, all by the clock of the first one, and the estimates of the same rows."""
-        stamps, truth = predictions.stamps[rows], self._truth
-        if not len(stamps):
+    def add(self, predictions: PredictionBlock, estimates: EstimateBlock) -> None:
+        """Add predictions, and the estimates at the same stamps."""
+        if not len(predictions.stamps):
             return
-        self._first = int(stamps[0]) if self._first is None else self._first
-        times = (stamps - self._first) * NANO + truth.times[0]
+        truth, self._first = self._truth, int(predictions.stamps[0]) if self._first is None else self._first
+        times = (predictions.stamps - self._first) * NANO + truth.times[0]
+        rows = (times >= truth.times[0]) & (times <= truth.times[-1])
+        times = times[rows]
         position, acceleration = truth.at(times, truth.position), truth.at(times, truth.acceleration)
         fed = estimates.is_fed[rows]
         errors = {

@@ -144,7 +144,6 @@ class Recording:
         self._newest: int | None = None
         self.first = 0  # stamp of the first prediction, ns
         self._count = self._before = 0  # predictions so far, and those in earlier stretches
-        self._rows_by_first_clock: int | None = None
         self._whole: Stretch | None = None
         self.gaps: list[tuple[int, int]] = []  # stamps (ns) between which strokes paused
         self.clock_sets: list[tuple[int, int]] = []  # stamps (ns) before and after a clock was set
@@ -183,8 +182,6 @@ class Recording:
         for found, kinds in ((self.gaps, {"gap", "restart"}), (self.clock_sets, {"clock set", "jump back"})):
             if before is not None and events & kinds:
                 found.append((before, int(predictions.stamps[at])))
-        if self.clock_sets and self._rows_by_first_clock is None:
-            self._rows_by_first_clock = self._count + at
 
     def close(self) -> None:
         """Complete the last stretch; to be called once, after the last `add`."""
@@ -202,7 +199,7 @@ class Recording:
             return
         self.totals.add(stretch)
         if self._errors is not None:
-            self._errors.add(stretch.predictions, self._by_first_clock(self._before), stretch.estimates)
+            self._errors.add(stretch.predictions, stretch.estimates)
         self._before = self._count
         if self._take is None:
             self._whole = stretch
@@ -230,13 +227,6 @@ class Recording:
         """
         span = (self._newest or 0) - self.first
         return (span - sum(after - before for before, after in self.clock_sets)) * NANO
-
-    def _by_first_clock(self, before: int) -> slice:
-        """Return the rows before a clock was set, in a stretch with so many predictions before it.
-
-        Their stamps tell the time since the first one.
-        """
-        return slice(None if self._rows_by_first_clock is None else max(0, self._rows_by_first_clock - before))
 
     def alarms(self) -> list[Alarm]:
         """Return all alarms, each once with its latest values, in the order of their beginning."""
