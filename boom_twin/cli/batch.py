@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    sources = "sessions, globs (quote them), or files *.txt that list these, one a line"
+    sources = "sessions, or globs (quote them)"
     parser.add_argument("bags", nargs="+", metavar="BAG", help=sources)
     place = "folder for tables and replays: new, empty, or of an earlier batch, which is continued"
     parser.add_argument("--out", required=True, metavar="DIR", type=Path, help=place)
