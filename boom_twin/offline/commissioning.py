@@ -250,8 +250,7 @@ def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, foun
 
 def _samples(session: Session, topics: Topics, window: TimeWindow, joints: int) -> Iterator[SampleBlock]:
     """Yield the samples of a session, without changes that a node made."""
-    wanted = [name for name in topics.streams_by_topic if session.count(name)]
-    return (item for item in SessionSamples(session, topics, wanted, joints, window) if isinstance(item, SampleBlock))
+    return (item for item in SessionSamples(session, topics, joints, window) if isinstance(item, SampleBlock))
 
 
 def _append_by_stream(columns: dict[Stream, list[Any]], streams: Integers, *fields: Any) -> None:

@@ -19,6 +19,7 @@ from ..messages.topic_table import Topics
 from ..system.received_files import holds_file, open_received
 from ..twin.blocks import EstimateBlock, PredictionBlock
 from ..types import NANO, Array
+from .session_samples import topics_read
 
 FILE_NAME = "truth.csv.gz"
 LARGEST_TRUTH = 64 * 2**20  # bytes of an unpacked file that are read: about an hour at 200 Hz
@@ -105,18 +106,17 @@ def load_truth(folder: Path) -> TipTruth | None:
     return TipTruth(times, np.column_stack([x, y]), np.column_stack([ax, ay]))
 
 
-def truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list[str]) -> TipTruth | None:
+def truth_in(window: TimeWindow, session: Session, topics: Topics) -> TipTruth | None:
     """Return the truth of a session from the first strokes in the window on."""
     truth = load_truth(session.path)
     if truth is None or window == WHOLE:
         return truth
-    first, begin = (_first_stroke_stamp(session, topics, wanted, part) for part in (WHOLE, window))
+    first, begin = (_first_stroke_stamp(session, topics, part) for part in (WHOLE, window))
     found = truth.since((begin - first) * NANO)
     return found if len(found.times) else None
 
 
-def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], window: TimeWindow) -> int:
+def _first_stroke_stamp(session: Session, topics: Topics, window: TimeWindow) -> int:
     """Return the stamp of the first message of strokes in a window, ns; 0 if there is none."""
-    types = {name: topics.inputs[topics.streams_by_topic[name][0]].type for name in wanted}
-    messages, drive = read(session, types, window), topics.stroke_reading.stream
+    messages, drive = read(session, topics_read(session, topics), window), topics.stroke_reading.stream
     return next((stamp_of(message) for name, _, message in messages if drive in topics.streams_by_topic[name]), 0)

@@ -124,7 +124,7 @@ def _take_predicted(feed: BagFeed, topics: Topics, given: ReplayInputs, twin: Tw
         compiling.join(READING_TIME)
         yield
     feed.phase = ""
-    samples = SessionSamples(given.session, topics, given.wanted, twin.twin.plan.joints, given.window).samples()
+    samples = SessionSamples(given.session, topics, twin.twin.plan.joints, given.window).samples()
     for step in drive(twin.twin, twin.twin.update, samples):
         if step is not None:
             twin.took(*step)
