@@ -48,11 +48,10 @@ def run(args: Namespace) -> int:
     if find_spec("aiohttp") is None:
         raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
     import asyncio
-
-    from ..monitor.access_control import write_log
+    import logging
 
     _lower_priority()
-    write_log()
+    logging.basicConfig(level=logging.WARNING, format="%(message)s")
     with closing(_bag_feed(args)) if args.bag is not None else _live_feed(args) as feed:
         asyncio.run(_serve(args, feed))
     return 0
