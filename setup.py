@@ -79,7 +79,6 @@ setup(
             "dask>=2025.5,<2027",
             "distributed>=2025.5,<2027",
             "pyarrow>=18,<27",
-            "psutil>=5.9,<8",
         ],
         "import": ["npTDMS>=1.13,<2", "asammdf>=8.8,<9", "pyarrow>=18,<27", "tzdata>=2025.1"],
         "fatigue": ["rainflow>=3.2,<4"],

@@ -35,7 +35,7 @@ from .mcap_records import (
     record_of,
     unpack,
 )
-from .scanner import DamagedBytes, definitions_of, scan_records
+from .scanner import DamagedBytes, FileDefinitions, scan_records
 from .session_file import (
     IN_ORDER,
     MOST_HELD,
@@ -164,19 +164,20 @@ def _has_checksum(file: BinaryIO, chunk: ChunkIndex) -> bool:
 
 def _walk(path: Path, library: str) -> McapFile:
     """Return the content of a file from all of its records. Compare its statistics, if any, with the messages found."""
-    known, counts, pieces, are_vouched = definitions_of(path), Counter[int](), list[Piece](), True
-    if known.is_summed is False:
-        raise McapError("crc validation failed: the checksum of the data does not fit")
+    known, counts, pieces, are_vouched = FileDefinitions(path), Counter[int](), list[Piece](), True
     for records in scan_records(path):
         if isinstance(records, DamagedBytes):
             raise McapError(f"byte {records.offset}: {records.reason}")
+        known.take(records)
         if len(block := _messages(records.content)):
             counts.update(channels := block.sources.tolist())
             span = int(block.log_times.min()), int(block.log_times.max())
             pieces.append(Piece(records.offset, records.length, len(records.content), *span, {*channels}))
             are_vouched &= records.vouched
-    if known.told is not None:
-        compare_counts(path, "statistics", known.told, "in the file", by_topic(counts, known.channels))
+    if known.is_summed is False:
+        raise McapError("crc validation failed: the checksum of the data does not fit")
+    if (told := known.told) is not None:
+        compare_counts(path, "statistics", told, "in the file", by_topic(counts, known.channels))
     return McapFile(
         path=path,
         storage="mcap",
@@ -187,7 +188,7 @@ def _walk(path: Path, library: str) -> McapFile:
         counts=dict(counts),
         start=min((piece.first for piece in pieces), default=0),
         end=max((piece.last for piece in pieces), default=0),
-        checked=bool(known.is_summed) or (bool(pieces) and are_vouched and known.told is not None),
+        checked=bool(known.is_summed) or (bool(pieces) and are_vouched and told is not None),
         notes=known.notes,
         pieces=pieces,
     )

@@ -6,7 +6,7 @@ import re
 import struct
 from collections import Counter
 from collections.abc import Container, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -213,59 +213,68 @@ def _is_start(file: BinaryIO, offset: int, size: int, channels: Container[int]) 
     return _chunk_length(file, offset) is not None or bool(_whole_record(file, offset, size))
 
 
-@dataclass(slots=True)
 class FileDefinitions:
-    """Definitions, notes and counts of one file."""
+    """Definitions, notes and counts of one file, from the sound records of a walk through it.
 
-    # channels, schemas: by number; one with a valid checksum replaces one without
-    channels: dict[int, Channel] = field(default_factory=dict)
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    notes: dict[str, str] = field(default_factory=dict)
-    told: Counter[str] | None = None  # number of messages by topic from a sound summary
-    is_summed: bool | None = None  # True if the checksum of the data section is valid; None without one
-
-
-def definitions_of(path: Path) -> FileDefinitions:
-    """Return the definitions, notes and counts of a file from one walk through it.
-
-    A definition is used if the checksum of its chunk or of the summary fits or is missing. Raise BagError if the profile is
-    ros1 or px4, or definitions exceed `LARGEST_SUMMARY`.
+    A definition is used if the checksum of its chunk or of the summary fits or is missing. One with a valid checksum replaces
+    one without.
     """
-    found, sure = FileDefinitions(), set[tuple[int, int]]()
-    statistics: Statistics | None = None
-    summary = summary_start(path)
-    budget, is_data = LARGEST_SUMMARY, True
-    for piece in scan_records(path):
-        if not isinstance(piece, SoundRecords):
-            continue
-        is_in_summary = summary is not None and piece.offset >= summary
-        is_sure = piece.vouched or is_in_summary
+
+    def __init__(self, path: Path) -> None:
+        self.channels: dict[int, Channel] = {}  # channels, schemas: by number
+        self.schemas: dict[int, Schema] = {}
+        self.notes: dict[str, str] = {}
+        self.is_summed: bool | None = None  # True if the checksum of the data section is valid; None without one
+        self._path, self._summary = path, summary_start(path)
+        self._sure, self._left, self._is_data = set[tuple[int, int]](), LARGEST_SUMMARY, True
+        self._statistics: Statistics | None = None
+
+    @property
+    def told(self) -> Counter[str] | None:
+        """Number of messages by topic from a sound summary."""
+        if self._statistics is None or not self._statistics.channel_message_counts.keys() <= self.channels.keys():
+            return None
+        return by_topic(self._statistics.channel_message_counts, self.channels)
+
+    def take(self, piece: SoundRecords) -> None:
+        """Take the next sound records. Raise BagError for profile ros1 or px4, and definitions above `LARGEST_SUMMARY`."""
+        is_in_summary = self._summary is not None and piece.offset >= self._summary
         for opcode, body in parts(piece.content):
-            if opcode in (Opcode.CHANNEL, Opcode.SCHEMA) and (is_sure or is_data):
-                budget -= len(body)
-                if budget < 0:
-                    raise BagError(
-                        f"{path}: more than {LARGEST_SUMMARY} bytes of definitions. It is not the work of a recorder."
-                    )
-                definition = record_of(opcode, body)
-                assert isinstance(definition, Channel | Schema)
-                table: dict[int, Any] = found.channels if opcode == Opcode.CHANNEL else found.schemas
-                if definition.id not in table or (is_sure and (opcode, definition.id) not in sure):
-                    table[definition.id] = definition
-                if is_sure:
-                    sure.add((opcode, definition.id))
+            if opcode in (Opcode.CHANNEL, Opcode.SCHEMA) and (piece.vouched or is_in_summary or self._is_data):
+                self._define(opcode, body, piece.vouched or is_in_summary)
             elif opcode in (Opcode.HEADER, Opcode.METADATA, Opcode.DATA_END) or (opcode == Opcode.STATISTICS and is_in_summary):
                 match record_of(opcode, body):
                     case Header(profile=("ros1" | "px4") as profile):
-                        raise BagError(f"{path}: profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system.")
+                        told = f"profile = {profile!r}: only {PROFILE!r} is saved. Use a tool of that system."
+                        raise BagError(f"{self._path}: {told}")
                     case Metadata(name=name, metadata=notes) if name == NOTES:
-                        found.notes |= notes
+                        self.notes |= notes
                     case DataEnd(data_section_crc=checksum):
-                        is_data, summary = False, summary or summary_start(path, piece.offset + piece.length)
-                        with open_received(path) as file:
-                            found.is_summed = checksum == checksum_of(file, 0, piece.offset) if checksum else None
+                        self._is_data = False
+                        self._summary = self._summary or summary_start(self._path, piece.offset + piece.length)
+                        with open_received(self._path) as file:
+                            self.is_summed = checksum == checksum_of(file, 0, piece.offset) if checksum else None
                     case Statistics() as counts:
-                        statistics = counts
-    if statistics is not None and statistics.channel_message_counts.keys() <= found.channels.keys():
-        found.told = by_topic(statistics.channel_message_counts, found.channels)
+                        self._statistics = counts
+
+    def _define(self, opcode: int, body: bytes, is_sure: bool) -> None:
+        self._left -= len(body)
+        if self._left < 0:
+            told = f"more than {LARGEST_SUMMARY} bytes of definitions. It is not the work of a recorder."
+            raise BagError(f"{self._path}: {told}")
+        definition = record_of(opcode, body)
+        assert isinstance(definition, Channel | Schema)
+        table: dict[int, Any] = self.channels if opcode == Opcode.CHANNEL else self.schemas
+        if definition.id not in table or (is_sure and (opcode, definition.id) not in self._sure):
+            table[definition.id] = definition
+        if is_sure:
+            self._sure.add((opcode, definition.id))
+
+
+def definitions_of(path: Path) -> FileDefinitions:
+    """Return the definitions, notes and counts of a file from one walk through it."""
+    found = FileDefinitions(path)
+    for piece in scan_records(path):
+        if isinstance(piece, SoundRecords):
+            found.take(piece)
     return found

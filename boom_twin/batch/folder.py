@@ -6,7 +6,6 @@ import fcntl
 import glob
 import json
 import os
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
@@ -22,57 +21,24 @@ from ..system.received_files import real_path
 from ..system.terminal_text import printable
 from .session_task import ALARM, Row
 
-LIST = ".txt"  # suffix of a file that lists sessions
-
 
 def sessions_of(sources: Iterable[str]) -> list[Path]:
     """Return all sessions of the sources, each once, in the order of the sources.
 
-    Sources are paths of sessions, globs, or files ``*.txt`` with one of these a line, where ``#`` begins a comment. Relative
-    paths in a file start at its folder. A path without wildcards is taken as it is, whether it is there or not. UsageError if
-    a glob fits no session, or a list cannot be read or is empty.
+    A source is the path of a session, which need not be there, or a glob. ``**`` does not follow links. UsageError if a glob
+    fits no session, a folder or a single file.
     """
     found: dict[str, Path] = {}
     for source in sources:
-        for path in _listed(Path(source)) if source.endswith(LIST) else _matching(source):
-            found.setdefault(os.path.realpath(path), path)
+        path = Path(source)
+        paths = [path]
+        if glob.has_magic(source) and not path.exists():
+            paths = sorted(filter(is_session, Path(path.anchor).glob(str(path.relative_to(path.anchor)))))
+        if not paths:
+            raise UsageError(f"{source}: fits no session (a folder of a rosbag2, or a file). Check it, and quote it.")
+        for each in paths:
+            found.setdefault(os.path.realpath(each), each)
     return list(found.values())
-
-
-def _listed(file: Path) -> Iterator[Path]:
-    try:
-        lines = [line.split("#")[0].strip() for line in file.read_text(encoding="utf-8").splitlines()]
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{file}: cannot be read as a list of sessions ({error}). Write a path or glob a line.") from None
-    if not any(lines):
-        raise UsageError(f"{file}: lists no session. Write a path or glob a line.")
-    for line in filter(None, lines):
-        yield from _matching(str(file.parent / line))
-
-
-def _matching(pattern: str) -> Iterator[Path]:
-    """Yield a path, or the sessions (folders and single files) that a glob fits."""
-    if not glob.has_magic(pattern) or Path(pattern).exists():
-        yield Path(pattern)
-        return
-    found = [path for path in map(Path, sorted(_expanded(pattern))) if is_session(path)]
-    if not found:
-        raise UsageError(f"{pattern}: fits no session, a folder of a rosbag2 or a file of a session. Check it, and quote it.")
-    yield from found
-
-
-def _expanded(pattern: str) -> Iterator[str]:
-    """Yield the paths that a glob fits. ``**`` does not follow links, which may lead in a circle."""
-    before, *after = re.split(r"(?<![^/])\*\*(?![^/])", pattern, maxsplit=1)
-    if not after:
-        yield from glob.glob(pattern)
-        return
-    for top in glob.glob(before or "."):
-        if not after[0]:
-            yield top
-        for folder, inner, _ in os.walk(top):
-            inner[:] = [name for name in inner if not name.startswith(".")]
-            yield from _expanded(glob.escape(folder) + (after[0] or "/*"))
 
 
 def key_of(session: Path) -> str:
@@ -95,7 +61,6 @@ def fingerprint(session: Path, options: str) -> str:
 
 MARK, TABLE, RIGS, PAGE = "batch.json", "sessions.parquet", "rigs.json", "batch.html"
 ROWS, SESSIONS = "rows", "sessions"  # folders of the rows, and of the replays
-DIGEST = "row_sha256"  # key of a row's digest in its file, by which a change is detected
 _OWN = frozenset({MARK, TABLE, RIGS, PAGE, ROWS, SESSIONS})
 
 
@@ -143,21 +108,19 @@ class BatchFolder:
     def kept(self, key: str, fingerprint: str) -> Row | None:
         """Return the row of a session if it is finished and its `fingerprint` is equal; None otherwise.
 
-        BagError if the file was changed since `keep` wrote it.
+        BagError if the file is damaged.
         """
         file = self.folder / ROWS / f"{key}.json"
         try:
             row = json.loads(file.read_bytes())
-            if row.pop(DIGEST) != _digest(row):
-                raise ValueError("changed")
+            return dict(row) if row["fingerprint"] == fingerprint else None
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        except (OSError, ValueError, LookupError, TypeError, RecursionError):
             raise BagError(f"{file}: this row of an earlier call is damaged. Its session is done anew.") from None
-        return dict(row) if row["fingerprint"] == fingerprint else None
 
     def keep(self, row: Row) -> None:
-        write_atomic(self.folder / ROWS / f"{row['key']}.json", json.dumps(row | {DIGEST: _digest(row)}) + "\n")
+        write_atomic(self.folder / ROWS / f"{row['key']}.json", json.dumps(row) + "\n")
 
     def mark(self, total: int, finished: int) -> None:
         """Write the number of finished sessions and the state of the batch."""
@@ -167,12 +130,8 @@ class BatchFolder:
         os.pwrite(self._lock, (json.dumps(told) + "\n").encode(), 0)
 
 
-def _digest(row: Row) -> str:
-    return sha256(json.dumps(row).encode()).hexdigest()
-
-
 _ALWAYS: dict[str, str] = {
-    "session": "string", "path": "string", "rig": "string", "status": "string", "reason": "string", "attempts": "int64",
+    "session": "string", "path": "string", "rig": "string", "status": "string", "reason": "string",
     "first_stamp_ns": "int64", "duration_s": "double", "samples": "int64", "dropped": "int64", "outside_validity": "int64",
     "wall_s": "double", "realtime_factor": "double", "peak_memory_bytes": "int64", "tip_acceleration_max_m_s2": "double",
     "joint_residual_rms_rad": "list", "joint_residual_normalised_mean": "list", "joint_residual_normalised_std": "list",

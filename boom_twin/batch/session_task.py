@@ -1,20 +1,19 @@
-"""Sessions of a batch in parallel: task, supervised process and row of each; threads that wait for them, here or on Dask."""
+"""Sessions of a batch in parallel: task, process and row of each, here or on the workers of Dask."""
 
 from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError
-from contextlib import contextmanager, suppress
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from shutil import rmtree
 from tempfile import TemporaryFile
 from threading import Thread
@@ -25,79 +24,51 @@ from ..errors import BagError, BoomTwinError, UsageError
 from ..system.processes import python_command
 
 if TYPE_CHECKING:
-    from distributed import Client
-
     from ..bag.session_file import TimeWindow
     from ..bag.session_model import SessionScene
     from ..config.settings import Settings
     from ..scene.schema import Scene
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """Result of a supervised process."""
-
-    output: bytes  # content of its stdout; whole only if there is no reason
-    reason: str  # of the failure in one line; empty if it ended with code 0
-    peak: int  # largest observed resident memory, bytes; pages that its processes share are counted in each
-
-
-def run_supervised(command: Sequence[str], task: bytes, seconds: float, memory: int) -> Outcome:
-    """Run `command` with the line `task` on stdin and return its result.
+class SessionProcess:
+    """Process that runs `command` with the line `task` on stdin, and has so many `seconds`.
 
     Stdin stays open: its end shows the process that its caller has ended. The process leads a group of its own, and all of
-    the group is ended with it. It may take so many `seconds`, and with all its children so much resident `memory`, bytes.
+    the group is ended with it.
     """
-    stderr_bytes = 2000  # number of last bytes of a process's stderr that are reported
-    with TemporaryFile() as out, TemporaryFile() as told:
-        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=out, stderr=told, start_new_session=True)
-        assert process.stdin is not None
-        try:
-            with suppress(BrokenPipeError):
-                process.stdin.write(task)
-                process.stdin.flush()
-            reason, peak = _watch(process, seconds, memory)
-        finally:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            code = process.wait()
-            with suppress(BrokenPipeError):
-                process.stdin.close()
-        out.seek(0)
-        if not reason and code:
+
+    def __init__(self, command: Sequence[str], task: bytes, seconds: float) -> None:
+        self._out, self._told, self._seconds = TemporaryFile(), TemporaryFile(), seconds  # noqa: SIM115
+        streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": self._out, "stderr": self._told}
+        self._process = subprocess.Popen(command, **streams, start_new_session=True)
+        self._due = time.monotonic() + seconds
+        assert self._process.stdin is not None
+        with suppress(BrokenPipeError):
+            self._process.stdin.write(task)
+            self._process.stdin.flush()
+
+    @property
+    def is_over(self) -> bool:
+        """Return True if the process has ended, or has had its time."""
+        return self._process.poll() is not None or time.monotonic() > self._due
+
+    def end(self) -> tuple[bytes, str]:
+        """End the group, and return stdout and the reason of a failure in one line; empty if the process ended with code 0."""
+        stderr_bytes = 2000  # number of last bytes of stderr that are looked at
+        is_late = self._process.poll() is None
+        with suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        code = self._process.wait()
+        with self._out as out, self._told as told, suppress(BrokenPipeError):
+            out.seek(0)
             told.seek(max(0, told.seek(0, os.SEEK_END) - stderr_bytes))
-            lines = told.read().decode(errors="replace").strip().splitlines()
-            cause = f"signal {-code}" if code < 0 else f"itself with code {code}"
-            reason = lines[-1] if lines and code > 0 else f"its process was ended by {cause}"
-        return Outcome(out.read(), reason, peak)
-
-
-def _watch(process: subprocess.Popen[bytes], seconds: float, memory: int) -> tuple[str, int]:
-    """Wait for the end of a process. Return the limit that it passed (empty if none) and its largest observed memory, bytes."""
-    look_period = 0.1  # seconds between two measurements of the memory
-    end, peak = time.monotonic() + seconds, 0
-    while True:
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(look_period)
-            return "", peak
-        peak = max(peak, _memory(process.pid))
-        if peak > memory:
-            return f"needs {peak / 1e6:.0f} MB of memory, more than {memory / 1e6:.0f} MB. Raise --memory.", peak
-        if time.monotonic() > end:
-            return f"takes longer than {seconds:g} s. Raise --timeout.", peak
-
-
-def _memory(pid: int) -> int:
-    """Return the resident memory of a process and all its children, bytes."""
-    import psutil
-
-    total = 0
-    with suppress(psutil.Error):
-        process = psutil.Process(pid)
-        for each in (process, *process.children(recursive=True)):
-            with suppress(psutil.Error):
-                total += each.memory_info().rss
-    return total
+            output, lines = out.read(), told.read().decode(errors="replace").strip().splitlines()
+            assert self._process.stdin is not None
+            self._process.stdin.close()
+        if is_late:
+            return output, f"takes longer than {self._seconds:g} s. Raise --timeout."
+        cause = f"signal {-code}" if code < 0 else f"itself with code {code}"
+        return output, "" if code == 0 else lines[-1] if lines and code > 0 else f"its process was ended by {cause}"
 
 
 def end_with_caller() -> None:
@@ -130,27 +101,11 @@ class SessionTask:
     report: bool  # is to be written, with its pictures
     keep_bag: bool  # of the replay
     time: float  # limit, s
-    memory: int  # limit of resident memory, bytes
-    retries: int  # further attempts if the session fails
+    memory: int  # limit of the data of each of its processes, bytes
     start: float = 0.0  # of the window, s, see `boom_twin.bag.session_file.TimeWindow`
     duration: float | None = None
     calibrate: bool = False  # the scene's parameters from the session as well; that assumes a healthy rig
     fatigue: float | None = None  # detail category, MPa, of the damage of all stations; None: it is not counted
-
-
-def run_task(task: SessionTask) -> Row:
-    """Replay a session in a process of its own and return its row, with the reason if it failed. Dask workers call this."""
-    line = json.dumps(asdict(task)).encode() + b"\n"
-    for attempt in range(1, task.retries + 2):
-        found = run_supervised(python_command(__name__), line, task.time, task.memory)
-        if not found.reason:
-            with suppress(ValueError):
-                return {**json.loads(found.output), "attempts": attempt, "peak_memory_bytes": found.peak}
-    return failed(task, found.reason or "its process told no result", attempt) | {"peak_memory_bytes": found.peak}
-
-
-def failed(task: SessionTask, reason: str, attempts: int) -> Row:
-    return {**_head(task), "status": FAILED, "reason": reason, "attempts": attempts}
 
 
 def _head(task: SessionTask) -> Row:
@@ -225,111 +180,79 @@ def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: Tim
 
 
 REMEDY = 'Run `pip install "boom_twin[batch]"`.'
-KILLED = "the workers that had it were ended from outside. Look for what ends them, as the system's memory."
 
 
-@dataclass(frozen=True, slots=True)
-class Workers:
-    """Workers of a batch: `work` returns the row of one session, `capacity` the number of sessions that may run at once."""
+def rows_here(tasks: Iterable[SessionTask], count: int) -> Generator[Row]:
+    """Yield the rows of all tasks as they finish, `count` at a time, each from a process of its own."""
+    look_period = 0.05  # seconds between two looks at the processes
+    waiting, running = deque(tasks), list[tuple[SessionTask, SessionProcess]]()
+    try:
+        while waiting or running:
+            while waiting and len(running) < count:
+                task = waiting.popleft()
+                line = json.dumps(asdict(task)).encode() + b"\n"
+                running.append((task, SessionProcess(python_command(__name__), line, task.time)))
+            time.sleep(look_period)
+            for each in [each for each in running if each[1].is_over]:
+                running.remove(each)
+                yield _row(each[0], *each[1].end())
+    finally:
+        for _, process in running:
+            process.end()
 
-    work: Callable[[SessionTask], Row]
-    capacity: Callable[[], int]
-    dashboard: str = ""
+
+def _row(task: SessionTask, output: bytes, reason: str) -> Row:
+    row = _head(task) | {"status": FAILED, "reason": reason} if reason else json.loads(output)
+    found: Row = json.loads(json.dumps(row, ensure_ascii=False).encode(errors="replace"))  # names that are not UTF-8
+    return found
 
 
-@contextmanager
-def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
-    """Yield the workers of the scheduler at an address (``tcp://host:8786``), or those of this process, which opens no port.
+def run_task(task: SessionTask) -> Row:
+    """Return the row of one task. Dask workers call this."""
+    return next(rows_here([task], 1))
 
-    `workers` is the number of sessions at once on this machine, by default that of its cores. UsageError if Dask is not
-    installed, BagError if no scheduler answers there.
+
+def rows_on_cluster(scheduler: str, tasks: Sequence[SessionTask]) -> Generator[Row]:
+    """Yield the rows of all tasks as they finish on the workers of a Dask scheduler at an address (``tcp://host:8786``).
+
+    Dask gives the task of a worker that ended to others. The row of a task that it gives up has the reason. UsageError if
+    Dask is not installed, BagError if no scheduler answers there.
     """
     connect_timeout = 20.0  # seconds for a scheduler to answer
-    if scheduler is None:
-        count = workers or os.cpu_count() or 1
-        yield Workers(run_task, lambda: count)
-        return
     try:
-        from distributed import Client
+        from distributed import Client, as_completed
     except ImportError:
         raise UsageError(f"dask is not installed, and --scheduler needs it. {REMEDY}") from None
     try:
-        client = Client(scheduler, timeout=connect_timeout, set_as_default=False)
+        client = Client(scheduler, timeout=connect_timeout)
     except (TimeoutError, OSError, ValueError) as error:
         remedy = "Start `dask scheduler`, check host and port."
         raise BagError(f"--scheduler {scheduler}: no Dask scheduler answers ({type(error).__name__}). {remedy}") from None
     with client:
-        yield on_dask(client, run_task)
-
-
-def on_dask(client: Client, work: Callable[[SessionTask], Row]) -> Workers:
-    """Return workers that pass `work` to those of a Dask cluster.
-
-    A task whose worker ends (killed, out of memory, a lost machine) goes to another worker. When Dask gives the task up, that
-    counts as one of its attempts.
-    """
-    from distributed import KilledWorker
-
-    def row_of(task: SessionTask) -> Row:
-        for attempt in range(1, task.retries + 2):
-            future = client.submit(work, task, key=f"{task.key}-{attempt}", pure=False, retries=0)
+        futures = {client.submit(run_task, task, pure=False): task for task in tasks}
+        for future in as_completed(futures):
             try:
-                return dict(future.result())
-            except KilledWorker:
-                reason = KILLED
-            except CancelledError:  # as of a row that was lost with its worker
-                reason = f"Dask gave it up ({future.status})"
+                yield future.result()
             except Exception as error:
-                reason = f"{type(error).__name__}: {error}"
-        return failed(task, reason, attempt)
-
-    return Workers(row_of, lambda: sum(client.nthreads().values()), client.dashboard_link)
-
-
-def rows_of(workers: Workers, tasks: Sequence[SessionTask]) -> Iterator[Row]:
-    """Yield the rows of all tasks as they finish. A failed task does not affect other rows.
-
-    A scheduler gets no more tasks than its workers have threads. When a worker ends, Dask counts that against every task
-    that waits there, not only against the running one. Workers that join later are used, too.
-    """
-    count_period = 5  # seconds between two counts of a cluster's workers
-    waiting, rows, threads = deque(tasks), SimpleQueue[Row](), list[Thread]()
-
-    def go() -> None:
-        while waiting:
-            task = waiting.popleft()
-            try:
-                row = workers.work(task)
-            except Exception as error:
-                row = failed(task, f"{type(error).__name__}: {error}", 1)
-            rows.put(json.loads(json.dumps(row, ensure_ascii=False).encode(errors="replace")))  # names that are not UTF-8
-
-    try:
-        for _ in tasks:
-            row = None
-            while row is None:
-                for _ in range(min(max(workers.capacity(), 1), len(tasks)) - len(threads)):
-                    threads.append(Thread(target=go, daemon=True))  # sessions end with this process, see end_with_caller
-                    threads[-1].start()
-                try:
-                    row = rows.get(timeout=count_period)
-                except Empty:
-                    continue
-            yield row
-    finally:
-        waiting.clear()
+                yield _row(futures[future], b"", f"{type(error).__name__}: {error}")
 
 
 def main() -> int:
     """Do the task given on stdin and print its row. If it fails, print the reason to stderr and return exit code 1."""
     task = SessionTask(**json.loads(sys.stdin.readline()))
     end_with_caller()
+    resource.setrlimit(resource.RLIMIT_DATA, (task.memory, task.memory))
     try:
-        print(json.dumps(row_of(task)))
+        row = row_of(task)
     except BoomTwinError as error:
-        print(str(error).replace("\n", " "), file=sys.stderr)
-        return 1
-    return 0
+        reason = str(error).replace("\n", " ")
+    except MemoryError:
+        reason = f"needs more than {task.memory / 1e6:.0f} MB of memory. Raise --memory."
+    else:
+        print(json.dumps(row | {"peak_memory_bytes": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss}))
+        return 0
+    print(reason, file=sys.stderr)
+    return 1
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bag.advice import refuse_conflicts
-from ..bag.reader import Session, check_topic, files_sha256, scan
+from ..bag.reader import Session, files_sha256, scan
 from ..bag.session_file import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
@@ -21,6 +21,7 @@ from ..kernels.tables import OK, SENTENCES
 from ..messages.topic_table import Topics
 from ..offline.session_samples import SessionSamples
 from ..scene.schema import Scene
+from ..twin.blocks import CODES, SampleBlock, block_of
 from ..types import NANO, SECOND, SENSORS, Array, Change, Mount, Place, Sample, Stream, StrokeReading, channels_of
 from .rest_filter import note_drives
 
@@ -66,32 +67,22 @@ def read_sessions(paths: Sequence[Path], topics: Topics, joints: int, window: Ti
     sessions = [scan(path) for path in paths]
     for session in sessions:
         refuse_conflicts(session, topics, joints)
-    wanted = [_wanted(session, topics) for session in sessions]
-    pairs = zip(sessions, wanted, strict=True)
-    return [_measured(each, SessionSamples(each, topics, names, joints, window), joints) for each, names in pairs]
-
-
-def _wanted(session: Session, topics: Topics) -> list[str]:
-    """Return the topics of strokes, which must be there, and of the other streams if they are."""
-    names = []
-    for stream, topic in topics.inputs.items():
-        found = session.find(topic.name)
-        if stream is Stream.STROKES:
-            check_topic(session, topic.name, topic.type)
-        if stream is Stream.STROKES or (found is not None and found.count and topic.name in topics.streams_by_topic):
-            names.append(topic.name)
-    return list(dict.fromkeys(names))
+    return [_measured(each, SessionSamples(each, topics, joints, window), joints) for each in sessions]
 
 
 def _measured(session: Session, samples: SessionSamples, joints: int) -> MeasuredSession:
-    found: dict[Stream, list[Sample]] = {stream: [] for stream in Stream}
-    changed = False
-    for sample in samples.samples():
-        if isinstance(sample, Change):
-            changed |= any(sample.zeros.values()) or max(sample.settings.get(load, -1.0) for load in LOADS) >= 0.0
-        elif sample is not None:
-            found[sample.stream].append(sample)
-    series = {stream: _series(group) for stream, group in found.items() if group}
+    blocks, changed = list[SampleBlock](), False
+    for item in samples:
+        if isinstance(item, Change):
+            changed |= any(item.zeros.values()) or max(item.settings.get(load, -1.0) for load in LOADS) >= 0.0
+        elif item is not None:
+            blocks.append(item)
+    whole, series = SampleBlock(*map(np.concatenate, zip(*blocks, strict=True))) if blocks else block_of([], joints), {}
+    for stream, names in channels_of(joints).items():
+        own = np.flatnonzero(whole.streams == CODES[stream])
+        stamps, first = np.unique(whole.stamps[own], return_index=True)
+        if len(own):
+            series[stream] = Series(stamps, whole.values[own[first], : len(names)])
     if Stream.STROKES not in series:
         met = ", ".join(f"{name}: {count}" for name, count in samples.oddities.items()) or "nothing"
         raise BagError(
@@ -105,11 +96,6 @@ def _measured(session: Session, samples: SessionSamples, joints: int) -> Measure
             "cylinders: give a session of this boom."
         )
     return MeasuredSession(session.path.resolve().name, files_sha256(session)[:12], series, changed)
-
-
-def _series(samples: list[Sample]) -> Series:
-    stamps, first = np.unique(np.array([sample.stamp for sample in samples]), return_index=True)
-    return Series(stamps, np.array([samples[i].values for i in first]))
 
 
 STREAMS = (Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES)  # compared, in the order of the channels

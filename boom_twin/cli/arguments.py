@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from argparse import REMAINDER, SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -106,74 +106,61 @@ def refuse_given(args: Namespace, remedy: str, *names: str) -> None:
 
 SENSORS = {"angles": Stream.ANGLES, "imu": Stream.IMU, "gyro": Stream.RATE, "forces": Stream.FORCES}
 """Sensors beside strokes by their names in ``--sensors``."""
-
-
-def sensors_of(text: str) -> list[str]:
-    """Return the names of `SENSORS` between commas; raise UsageError for another name."""
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    if unknown := [name for name in names if name not in SENSORS]:
-        raise UsageError(f"--sensors {text}: {', '.join(map(repr, unknown))} is no sensor. Give some of {', '.join(SENSORS)}.")
-    return names
-
-
 PLACE = "SECTION:AT[:TURNED]"
 FURTHER = {"imu": ("imu_2", "imu_3", "imu_4"), "point": ("points", "points_2")}
-"""Sensors that a boom may have at a place beside the IMU at the tip, by kind; a moment is that of its section."""
+"""Names of the sensors that a boom may have at places, by kind; a moment is that of its section."""
+SENSOR_LIST = (
+    f"{', '.join(SENSORS)} (a gyro is that of the tip IMU); imu@{PLACE}, gyro@.., moment@.., point@..: elsewhere, AT m along "
+    "the section from its inboard pivot, turned by TURNED rad (example: angles,imu,imu@2:3.1)"
+)
 
 
-def place_of(text: str, scene: Scene) -> Place:
-    """Return the place that is written as `PLACE` says; UsageError if there is none on the boom."""
+def sensors_of(text: str, scene: Scene) -> list[tuple[str, Stream, dict[str, Place]]]:
+    """Return name, stream and place of the sensors between commas, see `SENSOR_LIST`. A gyro is part of the IMU at its place.
+
+    UsageError for an unknown name, a place off the boom, or too many places.
+    """
+    chosen, found = list[tuple[str, Stream, dict[str, Place]]](), dict[tuple[str, str], dict[str, Place]]()
+    for name in filter(None, (part.strip() for part in text.split(","))):
+        kind, _, at = name.partition("@")
+        if not at and name in SENSORS:
+            chosen.append((name, SENSORS[name], {}))
+        elif at and kind in ("imu", "gyro", "moment", "point"):
+            holder = "imu" if kind == "gyro" else kind
+            if (holder, at) not in found:
+                taken = {stem for (other, _), places in found.items() if other == holder for stem in places}
+                found[holder, at] = _placed(holder, at, taken, scene)
+            (stem,) = found[holder, at]
+            stream = Stream.MOMENTS if kind == "moment" else Stream(stem + "_rate" * (kind == "gyro"))
+            chosen.append((name, stream, found[holder, at]))
+        else:
+            raise UsageError(f"--sensors {text}: {name!r} is no sensor. Give some of {SENSOR_LIST}.")
+    return chosen
+
+
+def _placed(kind: str, text: str, taken: set[str], scene: Scene) -> dict[str, Place]:
+    """Return the place that is written as `PLACE` says, by a name of its kind that is not among those `taken`."""
     section, _, rest = text.partition(":")
     at, _, turned = rest.partition(":")
     try:
-        place = Place(int(section), float(at), float(turned or 0.0))
+        place = Place(number := int(section), float(at), float(turned or 0.0))
     except ValueError:
-        raise UsageError(f"{text}: section, place (m) and turn (rad) must be numbers. Write {PLACE}.") from None
+        raise UsageError(f"{kind}@{text}: section, place (m) and turn (rad) must be numbers. Write {kind}@{PLACE}.") from None
     count = len(scene.sections)
-    if not 1 <= int(section) <= count:
-        raise UsageError(f"{text}: section = {section}, the boom has sections 1 to {count}. Give one of them.")
-    length = scene.sections[int(section) - 1].length
+    if not 1 <= number <= count:
+        raise UsageError(f"{kind}@{text}: section = {section}, the boom has sections 1 to {count}. Give one of them.")
+    length, beam = scene.sections[number - 1].length, scene.sections[number - 1].beam
     if not (0.0 <= float(at) <= length and isfinite(place.turned)):
-        raise UsageError(f"{text}: section {section} reaches from 0 to {length:g} m. Give the distance from its inboard pivot.")
-    return place
-
-
-def named_places(kind: str, texts: Sequence[str], scene: Scene) -> dict[str, Place]:
-    """Return the places of sensors of one kind by their names; UsageError for one off the boom or too many."""
-    places = [place_of(text, scene) for text in texts]
-    names = FURTHER.get(kind) or tuple(f"moment_{place.section}" for place in places)
-    if len(places) > len(names):
-        raise UsageError(f"{len(places)} places of {kind}, at most {len(names)} are possible. Leave some out.")
-    for text, place in zip(texts, places, strict=True):
-        beam = scene.sections[(place.section or 1) - 1].beam if scene.is_flexible((place.section or 1) - 1) else None
-        if kind == "moment" and not (beam and beam[0] < (place.at or 0.0) < beam[1]):
-            bends = f"bends from {beam[0]:g} to {beam[1]:g} m" if beam else "is rigid"
-            raise UsageError(f"--moment {text}: section {place.section} {bends}; strain is read on a beam only.")
-    if len(set(names)) < len(names):
-        raise UsageError("two strain gauges are on one section: one is possible. Leave the other out.")
-    return dict(zip(names, places, strict=False))
-
-
-def placed_sensors_of(text: str, scene: Scene) -> list[tuple[str, Stream, dict[str, Place]]]:
-    """Return name, stream and place of the sensors between commas; those with a place are written as imu@`PLACE`.
-
-    UsageError: see `sensors_of` and `named_places`. A gyro is part of the IMU at its place.
-    """
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    parts = [name.partition("@")[::2] for name in names]
-    sensors_of(",".join(kind for kind, at in parts if not at or kind not in ("imu", "gyro", "moment", "point")))
-    placed: dict[tuple[str, str], tuple[str, Place]] = {}  # name and place by kind and text
-    for kind, kinds in (("imu", ("imu", "gyro")), ("moment", ("moment",)), ("point", ("point",))):
-        texts = list(dict.fromkeys(at for own, at in parts if at and own in kinds))
-        found = zip(texts, named_places(kind, texts, scene).items(), strict=True)
-        placed |= {(own, at): named for at, named in found for own in kinds}
-    chosen = []
-    for name, part in zip(names, parts, strict=True):
-        stem, place = placed.get(part, ("", None))
-        end = "_rate" if part[0] == "gyro" else ""
-        stream = Stream.MOMENTS if stem.startswith("moment") else Stream(stem + end) if stem else SENSORS[name]
-        chosen.append((name, stream, {stem: place} if place else {}))
-    return chosen
+        told = f"section {section} reaches from 0 to {length:g} m. Give the distance from its inboard pivot."
+        raise UsageError(f"{kind}@{text}: {told}")
+    if kind == "moment" and not (beam and scene.is_flexible(number - 1) and beam[0] < float(at) < beam[1]):
+        bends = f"bends from {beam[0]:g} to {beam[1]:g} m" if beam and scene.is_flexible(number - 1) else "is rigid"
+        raise UsageError(f"moment@{text}: section {section} {bends}; strain is read on a beam only.")
+    names = FURTHER.get(kind, (f"moment_{section}",))
+    if not (free := [name for name in names if name not in taken]):
+        where = "on one section" if kind == "moment" else "on a boom"
+        raise UsageError(f"{kind}@{text}: one too many, at most {len(names)} of its kind are possible {where}. Leave it out.")
+    return {free[0]: place}
 
 
 def positive(text: str) -> float:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    sources = "sessions, globs (quote them), or files *.txt that list these, one a line"
+    sources = "sessions, or globs (quote them)"
     parser.add_argument("bags", nargs="+", metavar="BAG", help=sources)
     place = "folder for tables and replays: new, empty, or of an earlier batch, which is continued"
     parser.add_argument("--out", required=True, metavar="DIR", type=Path, help=place)
@@ -34,19 +34,19 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--fatigue", nargs="?", type=positive, const=71.0, metavar="CATEGORY", help=fatigue)
     parser.add_argument("--keep-bags", action="store_true", help="keep the result bag of every session")
     parser.add_argument("--timeout", metavar="S", type=positive, default=3600.0, help="limit for a session, s (default 3600)")
-    parser.add_argument("--memory", metavar="MB", type=positive, default=2000.0, help="limit for a session, MB (default 2000)")
-    parser.add_argument("--retries", metavar="N", type=at_least(0), default=1, help="attempts after a failure (default 1)")
-    parser.add_argument("--retry-failed", action="store_true", help="also repeat sessions that failed earlier")
+    parser.add_argument("--memory", metavar="MB", type=positive, default=2000.0, help="limit for a process, MB (default 2000)")
+    parser.add_argument("--retry-failed", action="store_true", help="repeat sessions that failed in an earlier call")
 
 
 def run(args: Namespace) -> int:
     """Replay what is not done yet, and write the table of all; exit code 1 if a session failed."""
     from ..batch.folder import PAGE, RIGS, TABLE, batch_folder, sessions_of, write_table
     from ..batch.results import counts, write_summaries
-    from ..batch.session_task import REMEDY, connected, rows_of
+    from ..batch.session_task import REMEDY, rows_here, rows_on_cluster
+    from ..system.processes import usable_cores
 
-    if missing := [name for name in ("pyarrow", "psutil") if find_spec(name) is None]:
-        raise UsageError(f"{missing[0]} is not installed, and batch needs it. {REMEDY}")
+    if find_spec("pyarrow") is None:
+        raise UsageError(f"pyarrow is not installed, and batch needs it. {REMEDY}")
     if args.fatigue is not None and find_spec("rainflow") is None:
         raise UsageError("--fatigue: needs the package rainflow. Install it: pip install 'boom_twin[fatigue]'.")
     sessions = sessions_of(args.bags)
@@ -54,17 +54,17 @@ def run(args: Namespace) -> int:
         tasks = _tasks(args, sessions, folder)
         done = {task.key: row for task in tasks if (row := _kept(args, folder, task)) is not None}
         if waiting := [task for task in tasks if task.key not in done]:
-            with connected(args.scheduler, args.workers) as workers:
-                dashboard = f"; dashboard: {workers.dashboard}" if workers.dashboard else ""
-                tell(f"{len(done)} of {len(tasks)} sessions are done{dashboard}")
-                try:
-                    with closing(ProgressLine(len(tasks), "sessions", "batch", len(done))) as progress:
-                        for row in rows_of(workers, waiting):
-                            folder.keep(row)
-                            done[row["key"]] = row
-                            progress.update(1)
-                finally:
-                    folder.mark(len(tasks), len(done))
+            tell(f"{len(done)} of {len(tasks)} sessions are done")
+            here = rows_here(waiting, args.workers or usable_cores())
+            found = rows_on_cluster(args.scheduler, waiting) if args.scheduler else here
+            try:
+                with closing(found), closing(ProgressLine(len(tasks), "sessions", "batch", len(done))) as progress:
+                    for row in found:
+                        folder.keep(row)
+                        done[row["key"]] = row
+                        progress.update(1)
+            finally:
+                folder.mark(len(tasks), len(done))
         rows = [done[task.key] for task in tasks]
         write_table(folder.folder / TABLE, rows)
         write_summaries(folder.folder, rows)
@@ -105,7 +105,6 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
             keep_bag=args.keep_bags,
             time=args.timeout,
             memory=round(1e6 * args.memory),
-            retries=args.retries,
         )
         for session in sessions
     ]

@@ -19,7 +19,7 @@ from ..scene.summary import UNKNOWNS_BASE, UNKNOWNS_PIN, Account, JointAccount, 
 from ..system.atomic_files import check_target
 from ..types import Place, Stream, StrokeReading
 from . import reduce as need
-from .arguments import PLACE, SENSORS, add_file, add_json, add_scene, files_of, placed_sensors_of
+from .arguments import SENSOR_LIST, add_file, add_json, add_scene, files_of, sensors_of
 from .output import columns, print_result, tell
 
 if TYPE_CHECKING:
@@ -36,8 +36,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     need.add_arguments(parser)
     chosen = (
         f"also tell how accurate the estimate of the tip is with these and with fewer, at every posture of the scene: "
-        f"{', '.join(SENSORS)}; a name given twice is two such sensors; imu@{PLACE}, gyro@.., moment@.., point@..: elsewhere "
-        f"(example: angles,imu,imu@2:3.1)"
+        f"{SENSOR_LIST}; a name given twice is two such sensors"
     )
     parser.add_argument("--sensors", metavar="NAME,..", help=chosen)
     driven = "what the sensors are beside: strokes (the default), or angles on a boom without stroke transducers"
@@ -50,7 +49,7 @@ def run(args: Namespace) -> int:
     if args.picture is not None:
         check_target(args.picture, files_of(args, "scene"), PNG)
     scene, oddities = examine(args.scene)
-    sensors = None if args.sensors is None else placed_sensors_of(args.sensors, scene)
+    sensors = None if args.sensors is None else sensors_of(args.sensors, scene)
     if args.drive == "angles" and any(stream is Stream.ANGLES for _, stream, _ in sensors or ()):
         raise UsageError("--sensors angles: they drive the model. Name the sensors beside them.")
     name = args.scene or DEFAULT_NAME

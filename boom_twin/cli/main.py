@@ -14,7 +14,7 @@ import re
 import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
-from contextlib import redirect_stderr, redirect_stdout, suppress
+from contextlib import nullcontext, redirect_stderr, redirect_stdout, suppress
 from difflib import get_close_matches
 from importlib import import_module
 from keyword import iskeyword
@@ -25,7 +25,7 @@ from .. import __version__
 from ..errors import BoomTwinError
 from ..system.processes import use_one_blas_thread
 from ..system.terminal_text import PrintableStream, open_closed_streams
-from .output import QuietStream
+from .output import quiet
 
 use_one_blas_thread()
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it looks for them in every installed package, which takes 12 ms
@@ -171,7 +171,7 @@ def _run(arguments: Sequence[str]) -> int:
     try:
         args = _parser(arguments).parse_args(arguments)
         name = f" {args.command}"
-        with redirect_stderr(cast(TextIO, QuietStream(sys.stderr)) if args.quiet else sys.stderr):
+        with quiet() if args.quiet else nullcontext():
             code: int = _command(args.command).run(args)
         sys.stdout.flush()
         return code

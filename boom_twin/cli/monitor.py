@@ -48,11 +48,10 @@ def run(args: Namespace) -> int:
     if find_spec("aiohttp") is None:
         raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
     import asyncio
-
-    from ..monitor.access_control import write_log
+    import logging
 
     _lower_priority()
-    write_log()
+    logging.basicConfig(level=logging.WARNING, format="%(message)s")
     with closing(_bag_feed(args)) if args.bag is not None else _live_feed(args) as feed:
         asyncio.run(_serve(args, feed))
     return 0
@@ -108,7 +107,7 @@ async def _serve(args: Namespace, feed: Feed) -> None:
     server = Server(feed, ViewerActions(feed, args.allow), access, webhook)
     try:
         async with serving(server, access, args.host, args.port) as address:
-            tell(f"open {address}   (Ctrl-C ends it)")
+            tell(f"open {address}   (Ctrl-C ends it)", is_kept=True)
             await stopped.wait()
     except OSError as error:
         raise BoomTwinError(f"cannot listen on {args.host}:{args.port}: {error.strerror}. Choose another --port.") from None

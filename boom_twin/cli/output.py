@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from io import TextIOBase
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stderr
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -18,35 +19,29 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 
-def tell(text: str) -> None:
-    """Print a line on stderr. ``--quiet`` keeps only warnings."""
-    print(text, file=sys.stderr, flush=True)
+_kept: TextIO | None = None  # standard error, for the lines that ``--quiet`` keeps
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Discard what is printed on standard error within the context, except lines that are kept."""
+    global _kept
+    with open(os.devnull, "w", encoding="utf-8") as nothing:
+        try:
+            _kept = sys.stderr
+            with redirect_stderr(nothing):
+                yield
+        finally:
+            _kept = None
+
+
+def tell(text: str, is_kept: bool = False) -> None:
+    """Print a line on stderr. ``--quiet`` discards it unless it `is_kept`."""
+    print(text, file=(_kept if is_kept else None) or sys.stderr, flush=True)
 
 
 def warn(text: str) -> None:
-    tell(f"warning: {text}")
-
-
-KEPT = ("warning", "boom_twin ", "usage:", "open ")
-"""Prefixes of lines that ``--quiet`` keeps; the last one is the live page's address."""
-
-
-class QuietStream(TextIOBase):
-    """Text stream that passes only lines with a beginning in `KEPT` on to `stream`."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream, self._begun = stream, ""
-
-    def write(self, text: str) -> int:
-        """Buffer text and pass on complete lines."""
-        *lines, self._begun = (self._begun + text).replace("\r", "\n").split("\n")
-        for line in lines:
-            if line.startswith(KEPT):
-                self._stream.write(f"{line}\n")
-        return len(text)
-
-    def flush(self) -> None:
-        self._stream.flush()
+    tell(f"warning: {text}", is_kept=True)
 
 
 def open_scene(source: str | None) -> Scene:
@@ -84,7 +79,7 @@ def open_session_settings(session: str | Path, params: Path | None, namespace: s
 
 def tell_oddities(oddities: Iterable[Fault], source: str | None) -> None:
     for oddity in oddities:
-        tell(f"{oddity.kind}: {source}: {oddity}")
+        tell(f"{oddity.kind}: {source}: {oddity}", is_kept=oddity.kind == "warning")
 
 
 def warn_incomplete(session: Session) -> None:

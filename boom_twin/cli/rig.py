@@ -10,8 +10,9 @@ from typing import NoReturn
 from .. import __version__
 from ..errors import UsageError
 from ..scene.schema import Scene
+from ..types import SENSORS as KINDS
 from ..types import Place, Stream, StrokeReading
-from .arguments import PLACE, add_scene, files_of, named_places, positive, sensors_of
+from .arguments import SENSOR_LIST, add_scene, files_of, positive, sensors_of
 from .output import tell, tell_oddities
 
 
@@ -40,17 +41,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         "wind:DEVIATION[:TIME_SCALE] (N, s; gusts, horizontal), with @ONSET (s), for instance pump:0.43:130; may be repeated"
     )
     parser.add_argument("--load", action="append", default=[], metavar="KIND:NUMBERS[@ONSET]", help=load)
-    sensors = "what is recorded beside strokes, of angles, imu, gyro (that of the tip IMU) and forces; default angles,imu"
+    sensors = f"what is recorded beside strokes, default angles,imu: {SENSOR_LIST}"
     parser.add_argument("--sensors", default="angles,imu", metavar="LIST", help=sensors)
-    imu = (
-        "another IMU with a gyro, AT m along a SECTION from its inboard pivot, its x axis turned by TURNED rad against the "
-        "section; up to three times"
-    )
-    parser.add_argument("--imu", action="append", default=[], metavar=PLACE, help=imu)
-    gauge = "a strain gauge that reads the bending moment AT m along a SECTION; one on each section"
-    parser.add_argument("--moment", action="append", default=[], metavar="SECTION:AT", help=gauge)
-    point = "a point whose position is measured once a second, as by a total station; up to twice"
-    parser.add_argument("--point", action="append", default=[], metavar="SECTION:AT", help=point)
     pressure = "pressures of both sides of every cylinder; bore and rod (m) of all, or, without a value, as in the scene's oil"
     parser.add_argument("--pressures", nargs="?", const="", metavar="BORE:ROD", help=pressure)
     parser.add_argument("--rate", type=float, metavar="HZ", help="rate of all sensors, 50 to 1000 (default 200)")
@@ -66,12 +58,11 @@ class ListFaults(Action):
         parser.exit()
 
 
-def _refuse_unrecorded(causes: list[str], recorded: set[str]) -> None:
+def _refuse_unrecorded(causes: list[str], given: str, recorded: set[Stream]) -> None:
     for cause in causes:
-        for stem, sensors in (("joint_", "angles"), ("cylinder_force_", "forces")):
-            if cause.startswith(stem) and sensors not in recorded:
-                enough = ",".join(sorted([*recorded, sensors]))
-                raise UsageError(f"fault {cause}: {sensors} are not recorded. Give --sensors {enough}.")
+        for stem, name, stream in (("joint_", "angles", Stream.ANGLES), ("cylinder_force_", "forces", Stream.FORCES)):
+            if cause.startswith(stem) and stream not in recorded:
+                raise UsageError(f"fault {cause}: {name} are not recorded. Give --sensors {given},{name}.")
 
 
 def _mapping_text(places: Mapping[str, Place], cylinders: Sequence[tuple[float, float]]) -> str | None:
@@ -119,16 +110,16 @@ def run(args: Namespace) -> int:
     tell_oddities(assumed.oddities, assumed.source)
     scene = assumed.scene
     duration = BUNDLED_DURATION if args.duration is None else args.duration
-    recorded = set(sensors_of(args.sensors))
+    chosen = sensors_of(args.sensors, scene)
+    recorded = {stream for _, stream, _ in chosen}
+    places = {name: place for *_, own in chosen for name, place in own.items()}
     sensors = Sensors() if args.rate is None else Sensors(args.rate)
-    asked = (("imu", args.imu), ("moment", args.moment), ("point", args.point))
-    places = {name: place for kind, texts in asked for name, place in named_places(kind, texts, scene).items()}
     cylinders = _cylinders(args.pressures, scene)
-    if cylinders and "forces" in recorded:
+    if cylinders and Stream.FORCES in recorded:
         raise UsageError("--pressures: they are read as forces, and a cylinder has one force. Leave forces out of --sensors.")
     wrong = [faults.parse(text) for text in args.fault]
     faults.check(wrong, scene, duration)
-    _refuse_unrecorded([fault.cause for fault in wrong], recorded)
+    _refuse_unrecorded([fault.cause for fault in wrong], args.sensors, recorded)
     boom, changes = faults.changes(faults.wrong_by(scene, args.wrong, args.rig_seed), wrong)
     pushing = [loads.parse(text) for text in args.load]
     loads.check(pushing, duration)
@@ -147,7 +138,7 @@ def run(args: Namespace) -> int:
         notes["loads"] = f"at the tip, wind seed {args.seed}: " + ", ".join(map(str, pushing))
     if args.rate is not None:
         notes["rate"] = f"{args.rate:g} Hz"
-    if "forces" in recorded:
+    if Stream.FORCES in recorded:
         notes["forces"] = f"noise {sensors.force_sigma:g} N, resolution {sensors.force_resolution:g} N"
     with result_folder(out, RIG, files_of(args, "scene")) as building:
         tell(f"simulating {duration:g} s, about as long as that ..")
@@ -155,11 +146,10 @@ def run(args: Namespace) -> int:
             boom, drive, duration, sensors, args.seed, load=load, changes=changes, places=places, cylinders=cylinders
         )
         session = faults.spoil(session, wrong, args.seed)
-        readings = {"angles": session.joints, "imu": session.imu, "forces": session.forces}
-        joints, imu, forces = (values if name in recorded else None for name, values in readings.items())
-        placed = {stream: rows for stream, rows in session.placed.items() if stream is not Stream.RATE or "gyro" in recorded}
-        values = {Stream.STROKES: session.strokes, Stream.ANGLES: joints, Stream.IMU: imu, Stream.FORCES: forces, **placed}
-        there = {stream: rows for stream, rows in values.items() if rows is not None}
+        readings = {Stream.STROKES: session.strokes, Stream.ANGLES: session.joints, Stream.IMU: session.imu}
+        readings |= {Stream.FORCES: session.forces, **session.placed}
+        wanted = {Stream.STROKES, Stream.PRESSURES, *recorded, *(Stream(KINDS[each].beside or each) for each in recorded)}
+        there = {stream: rows for stream, rows in readings.items() if stream in wanted}
         write_samples(building, samples_in_rows(session.stamps, there, session.angle_stamps), there, notes)
         # not the boom that was simulated: what a twin is to assume
         own = _mapping_text(places, cylinders)

@@ -17,13 +17,6 @@ from ..sensor_kinds import SensorKind
 from ..types import StrokeReading
 from .yaml_text import read_plain
 
-_GONE = ("jerk_density", "lag", "stroke_agility", "step", "look_step", "step_tip_error", "step_acceleration_error", "rho")
-RETIRED = dict.fromkeys(
-    (*_GONE, "section_deviation"), "without effect since 0.2.0, whose filter adapts by itself: leave it out"
-) | dict.fromkeys(("false_alarms", "baseline", "leap"), "without effect since 0.2.0: leave it out")
-"""Parameters of earlier versions, and the remedy for each."""
-
-
 ROS_OWN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 """First part of the names of parameters that rclpy declares for every node."""
 
@@ -90,7 +83,7 @@ class _Table(BaseModel):
                 if e["type"] == "extra_forbidden":
                     told = f"unknown. The nearest is `{nearest(name, [*cls.model_fields, *others])}`"
                     known = f" Known parameters: {', '.join(cls.model_fields)}."
-                lines.append(f"{name} = {e['input']!r}: {RETIRED.get(name, told)}")
+                lines.append(f"{name} = {e['input']!r}: {told}")
             raise UsageError(f"{source}: " + "; ".join(lines) + f".{known}") from None
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from math import nan, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..analysis.bending_stress import BendingStressModel, stations
 from ..deviation.load_spectrum import TipLoadFinder
@@ -17,7 +18,6 @@ from ..predictions import Estimate, Prediction
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
 from .levels import Bounds, ComponentJudge, Level, Status, Value
-from .sensor_status import RowBuffer
 
 FAILURE_SHOWN = 1.0  # time (s) for which a failure is shown
 LOAD_WINDOW = 40 * SECOND  # ns, window of loads at the tip
@@ -117,22 +117,31 @@ class ModelWatch:
         self._looked, self._steps, self._busy, self._longest = now, 0, 0.0, 0.0
 
 
-class StampWindow(RowBuffer):
-    """Rows of the last `window` (ns) by their stamps, at most one in every `INTERVAL`."""
+class StampWindow:
+    """Rows of `width` numbers of the last `window` (ns) by their stamps, at most one in every `INTERVAL`."""
 
     def __init__(self, window: int, width: int) -> None:
-        super().__init__(width)
-        self._window, self._newest = window, -INTERVAL
+        self._window, self._width, self._rows = window, width, deque[tuple[int, Array]]()
+
+    @property
+    def stamps(self) -> NDArray[np.int64]:
+        return np.array([stamp for stamp, _ in self._rows], np.int64)
+
+    @property
+    def rows(self) -> Array:
+        return np.array([row for _, row in self._rows], float).reshape(-1, self._width)
 
     def is_due(self, stamp: int) -> bool:
         """Return True if no row was added within the `INTERVAL` before `stamp` (ns)."""
-        return not 0 <= stamp - self._newest < INTERVAL
+        return not self._rows or not 0 <= stamp - self._rows[-1][0] < INTERVAL
 
     def add(self, stamp: int, row: Array) -> None:
         """Add a row that `is_due`; forget all if the clock was set back."""
-        is_back, self._newest = stamp < self._newest, stamp
-        self.forget(len(self.stamps) if is_back else int(np.searchsorted(self.stamps, stamp - self._window)))
-        super().add(stamp, row)
+        if self._rows and stamp < self._rows[-1][0]:
+            self._rows.clear()
+        self._rows.append((stamp, row))
+        while self._rows[0][0] < stamp - self._window:
+            self._rows.popleft()
 
 
 class SwingWatch:

@@ -73,34 +73,6 @@ class Channel:
         )
 
 
-class RowBuffer:
-    """Rows of `width` numbers with stamps (ns), in the order of arrival: to make an array of a list of rows takes 1 ms."""
-
-    def __init__(self, width: int) -> None:
-        self._stamps, self._rows, self._kept = np.empty(0, np.int64), np.empty((0, width)), slice(0, 0)
-
-    @property
-    def stamps(self) -> NDArray[np.int64]:
-        return self._stamps[self._kept]
-
-    @property
-    def rows(self) -> Array:
-        return self._rows[self._kept]
-
-    def add(self, stamp: int, row: Array) -> None:
-        if self._kept.stop == len(self._stamps):
-            count, (_, width) = len(self.stamps), self._rows.shape
-            size = max(64, 2 * count)
-            self._stamps, self._rows = np.resize(self.stamps, size), np.resize(self.rows, (size, width))
-            self._kept = slice(0, count)
-        self._stamps[self._kept.stop], self._rows[self._kept.stop] = stamp, row
-        self._kept = slice(self._kept.start, self._kept.stop + 1)
-
-    def forget(self, count: int) -> None:
-        """Forget the oldest rows."""
-        self._kept = slice(self._kept.start + count, self._kept.stop)
-
-
 class StreamWatch:
     """Statistics of one stream, computed when `look` is called. Times are in s, stamps in ns.
 
@@ -119,7 +91,7 @@ class StreamWatch:
         self._heard, self._looked_count, self._least, self.lag = self._monotonic(), self.count, nan, nan
         self._counted = nan, 0
         self._channels = [Channel(*bounds) for bounds in self._ranges]
-        self._samples = RowBuffer(len(self._ranges))
+        self._samples: list[tuple[int, Array]] = []  # stamps (ns) and values since the last look
 
     def seen(self, stamp: int) -> None:
         self.count += 1
@@ -131,7 +103,7 @@ class StreamWatch:
 
     def took(self, sample: Sample) -> None:
         """Take the sample of a message. A refused message has none."""
-        self._samples.add(sample.stamp, sample.values)
+        self._samples.append((sample.stamp, np.array(sample.values)))
 
     def age(self, now: float) -> float:
         """Return the time since the last message, or since listening began."""
@@ -153,8 +125,9 @@ class StreamWatch:
 
     def look(self, longest: float) -> list[ChannelStats]:
         """Return the statistics of every channel since the last look; `longest` (s) is the largest permitted step of stamps."""
-        stamps, table = self._samples.stamps, self._samples.rows
-        self._samples.forget(len(stamps))
+        stamps = np.array([stamp for stamp, _ in self._samples], np.int64)
+        table = np.array([values for _, values in self._samples], float).reshape(len(stamps), len(self._ranges))
+        self._samples = []
         refused = max(0, self.count - self._looked_count - len(stamps))
         self._looked_count = self.count
         self.lag, self._least = self._least, nan

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Thresholds
-from ..types import SENSORS, Health, Report, Sample, Stream
+from ..types import SENSORS, Array, Health, Report, Sample, Stream
 from .levels import ComponentJudge, Evaluation, Level, Status, Value
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, SwingWatch, stress_status
-from .sensor_status import RowBuffer, SensorSpec, StreamWatch, sensor_status
+from .sensor_status import SensorSpec, StreamWatch, sensor_status
 from .topic_status import Peers, Reception, ReceptionWatch, outputs_status, publishers_status, seconds, topic_status
 
 
@@ -46,7 +46,7 @@ class TwinWatch:
         self._judges: dict[str, ComponentJudge] = {}
         drive = "strokes" if self._drive is Stream.STROKES else "angles"
         self._model, self._load, self._swing = ModelWatch(self._looked, drive), LoadWatch(), SwingWatch()
-        self._rows: dict[tuple[str, ...], RowBuffer] = {}  # normalised residuals, by channels
+        self._rows: dict[tuple[str, ...], list[Array]] = {}  # normalised residuals since the last look, by channels
         self._residuals: dict[str, ResidualWindow] = {}
         self._newest: Report | None = None  # newest with a prediction
         self._silent: set[Stream] = set()
@@ -62,9 +62,7 @@ class TwinWatch:
         self._streams[sample.stream].took(sample)
         self._model.took(report, duration)
         for residuals in report.residuals:
-            if (rows := self._rows.get(residuals.names)) is None:
-                rows = self._rows[residuals.names] = RowBuffer(len(residuals.names))
-            rows.add(residuals.stamp, residuals.normalised)
+            self._rows.setdefault(residuals.names, []).append(residuals.normalised)
         if report.prediction is not None:
             self._newest = report
         self._swing.took(report)
@@ -155,11 +153,11 @@ class TwinWatch:
         if self._stress is not None and self._newest is not None and self._newest.prediction is not None:
             bending = judge("bending")
             found.append(stress_status(bending, self._stress, self._newest.prediction, self._newest.estimate))
-        for names, kept in self._rows.items():
-            for name, column in zip(names, kept.rows.T, strict=True):
+        for names, rows in self._rows.items():
+            for name, column in zip(names, np.array(rows, float).reshape(-1, len(names)).T, strict=True):
                 window = self._residuals.setdefault(name, ResidualWindow(self._looked))
                 window.take(column, at.now)
-            kept.forget(len(kept.rows))
+            rows.clear()
         self._looked = at.now
         return found + sensors + [self._residual(judge(f"residual {name}"), name) for name in self._residuals]
 

@@ -1,4 +1,4 @@
-"""Access to the live page: checks of Host, Origin and token; answers to invalid requests; limit on lines of the log."""
+"""Access to the live page: checks of Host, Origin and token; answers to invalid requests."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import hmac
 import logging
 import re
 import secrets
-import sys
-import time
 from http import HTTPStatus
 from ipaddress import ip_address
 from pathlib import Path
@@ -18,6 +16,7 @@ from aiohttp import web
 
 from ..errors import UsageError
 from ..system.terminal_text import printable
+from .data.store import is_logged
 
 LOG = logging.getLogger("boom_twin.monitor.connections")
 
@@ -104,6 +103,8 @@ class AccessControl:
 class Connection(web.RequestHandler):
     """Connection whose requests aiohttp reads. Every answer has the headers of `POLICY`, even if the request is invalid."""
 
+    _invalid = 0  # requests of all connections
+
     def __init__(self, server: web.Server) -> None:
         how: dict[str, Any] = {"keepalive_timeout": 5.0, "lingering_time": 0.0, "auto_decompress": False}  # s, s
         super().__init__(server, loop=asyncio.get_running_loop(), access_log=None, **how)  # type: ignore[arg-type]
@@ -113,49 +114,18 @@ class Connection(web.RequestHandler):
     ) -> web.StreamResponse:
         """Return the answer to an invalid request or a failing handler.
 
-        An invalid request is logged in one line, a disconnected peer is not.
+        Invalid requests are logged in a line each, see `is_logged`, disconnected peers are not.
         """
         logged_length = 200  # largest length of a logged error message
         if isinstance(exc, ConnectionError):
             return web.Response(status=status)
         if status == HTTPStatus.BAD_REQUEST:
-            LOG.warning("no request from %s: %s", request.remote, printable(str(message)[:logged_length], keep=""))
+            Connection._invalid += 1
+            if is_logged(Connection._invalid):
+                LOG.warning("no request from %s: %s", request.remote, printable(str(message)[:logged_length], keep=""))
             response: web.StreamResponse = web.Response(status=status, text=message)
             response.force_close()
         else:
             response = super().handle_error(request, status, exc, message)
         response.headers.update(POLICY)
         return response
-
-
-LOG_PERIOD = 10.0  # period (s) of the log's rate limit
-MAX_LOG_LINES = 3  # largest number of records of one logger in a `LOG_PERIOD`
-
-
-class LogRateLimit(logging.Filter):
-    """Filter that passes `MAX_LOG_LINES` records of each logger in a `LOG_PERIOD`.
-
-    The first record after the period states how many were left out.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._periods: dict[str, tuple[float, int]] = {}
-
-    def filter(self, record: logging.LogRecord) -> bool:
-        now = time.monotonic()
-        begin, count = self._periods.get(record.name, (now, 0))
-        if now - begin >= LOG_PERIOD:
-            if count > MAX_LOG_LINES:
-                left_out = f"({count - MAX_LOG_LINES} lines before this were left out)"
-                record.msg, record.args = f"{record.getMessage()} {left_out}", None
-            begin, count = now, 0
-        self._periods[record.name] = begin, count + 1
-        return count < MAX_LOG_LINES
-
-
-def write_log() -> None:
-    """Write warnings of all loggers of this process to standard error, limited by `LogRateLimit`."""
-    handler = logging.StreamHandler(sys.stderr)
-    handler.addFilter(LogRateLimit())
-    logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])

@@ -19,6 +19,7 @@ from ..messages.topic_table import Topics
 from ..system.received_files import holds_file, open_received
 from ..twin.blocks import EstimateBlock, PredictionBlock
 from ..types import NANO, Array
+from .session_samples import topics_read
 
 FILE_NAME = "truth.csv.gz"
 LARGEST_TRUTH = 64 * 2**20  # bytes of an unpacked file that are read: about an hour at 200 Hz
@@ -46,7 +47,8 @@ class TipTruth:
 class TipErrors:
     """Root mean square errors of predictions, and of the estimates beside them, that come in parts.
 
-    The first prediction of all is at the truth's first time.
+    The first prediction of all is at the truth's first time. Predictions outside the truth's times, as after a clock was set,
+    do not count.
     """
 
     def __init__(self, truth: TipTruth) -> None:
@@ -54,13 +56,14 @@ class TipErrors:
         self._first: int | None = None
         self._counts, self._squares = defaultdict[str, int](int), defaultdict[str, float](float)  # by names in ``summary.json``
 
-    def add(self, predictions: PredictionBlock, rows: slice, estimates: EstimateBlock) -> None:
-        """Add some rows of predictions, all by the clock of the first one, and the estimates of the same rows."""
-        stamps, truth = predictions.stamps[rows], self._truth
-        if not len(stamps):
+    def add(self, predictions: PredictionBlock, estimates: EstimateBlock) -> None:
+        """Add predictions, and the estimates at the same stamps."""
+        if not len(predictions.stamps):
             return
-        self._first = int(stamps[0]) if self._first is None else self._first
-        times = (stamps - self._first) * NANO + truth.times[0]
+        truth, self._first = self._truth, int(predictions.stamps[0]) if self._first is None else self._first
+        times = (predictions.stamps - self._first) * NANO + truth.times[0]
+        rows = (times >= truth.times[0]) & (times <= truth.times[-1])
+        times = times[rows]
         position, acceleration = truth.at(times, truth.position), truth.at(times, truth.acceleration)
         fed = estimates.is_fed[rows]
         errors = {
@@ -103,18 +106,17 @@ def load_truth(folder: Path) -> TipTruth | None:
     return TipTruth(times, np.column_stack([x, y]), np.column_stack([ax, ay]))
 
 
-def truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list[str]) -> TipTruth | None:
+def truth_in(window: TimeWindow, session: Session, topics: Topics) -> TipTruth | None:
     """Return the truth of a session from the first strokes in the window on."""
     truth = load_truth(session.path)
     if truth is None or window == WHOLE:
         return truth
-    first, begin = (_first_stroke_stamp(session, topics, wanted, part) for part in (WHOLE, window))
+    first, begin = (_first_stroke_stamp(session, topics, part) for part in (WHOLE, window))
     found = truth.since((begin - first) * NANO)
     return found if len(found.times) else None
 
 
-def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], window: TimeWindow) -> int:
+def _first_stroke_stamp(session: Session, topics: Topics, window: TimeWindow) -> int:
     """Return the stamp of the first message of strokes in a window, ns; 0 if there is none."""
-    types = {name: topics.inputs[topics.streams_by_topic[name][0]].type for name in wanted}
-    messages, drive = read(session, types, window), topics.stroke_reading.stream
+    messages, drive = read(session, topics_read(session, topics), window), topics.stroke_reading.stream
     return next((stamp_of(message) for name, _, message in messages if drive in topics.streams_by_topic[name]), 0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from ..compiler.plan import Plan
 from ..deviation.estimate_row import VARIANCES
 from ..deviation.sensor_model import specific_force
 from ..plots import AlarmSpan, EstimateTrace, History, ImuTrace, ResidualTrace, Truth, replay_pictures
-from ..plots.history import ExtremeRows
+from ..plots.history import extremes
 from ..plots.residuals import SessionDistributionsBuilder, running_mean
 from ..plots.results import SLOW
 from ..plots.session import ENLARGED_SPAN
@@ -58,7 +58,8 @@ def course(history: History, scene: Scene, most: int) -> tuple[Array, Array]:
 
 
 POSTURES = 9  # postures of a session whose natural frequencies are computed
-MOST_ROWS = 2**15  # rows of predictions, and of each stream's residuals, beyond which they are thinned out: 2.7 min at 200 Hz
+LONGEST_WHOLE = 160.0  # s, of a session whose rows are all drawn
+BINS = 1000.0  # parts of time of a longer session: one and a half pixels each
 PREDICTED = (
     "stamps_s", "tip_displacement", "tip_position", "tip_acceleration", "joints", "cylinder_forces", "strokes", "moments",
     "slow_moments",
@@ -72,15 +73,17 @@ EXTREME = ("tip_displacement", "tip_position", "tip_acceleration", "moments", "s
 
 
 class HistoryBuilder:
-    """Builder of a session's history from its stretches; its memory does not grow with their number."""
+    """Builder of a session's history from its stretches.
+
+    Of a session above `LONGEST_WHOLE`, only the rows with the least or the largest value in one of its `BINS` parts are kept,
+    and those that are shown enlarged. So curves span what all rows spanned, and memory hardly grows with the session.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._plan = scene, compile_scene(scene)
-        self._predicted = ExtremeRows(MOST_ROWS, EXTREME)
-        self._imu = ExtremeRows(MOST_ROWS, ("measured", "predicted"))
-        self._residuals = {stream: ExtremeRows(MOST_ROWS, ("values", "means")) for stream in Stream}
+        self._tables: dict[str | Stream, dict[str, list[Array]]] = {}
         self._distributions = SessionDistributionsBuilder()
-        self._shapes = _Shapes()
+        self._shapes: list[tuple[float, Array]] = []
         self._peak, self._peak_at = -1.0, 0.0  # largest acceleration of the tip, and when, s
 
     def add(self, stretch: Stretch) -> History:
@@ -89,13 +92,17 @@ class HistoryBuilder:
         own = _stretch_history(stretch, self._scene, self._plan, residuals)
         self._note_peak(own)
         self._distributions.add(own)
+        width = stretch.length / BINS if stretch.length > LONGEST_WHOLE else 0.0
         estimated = dict(zip(ESTIMATED, _estimate_trace(stretch).columns, strict=True))
-        self._put(self._predicted, {name: getattr(own, name) for name in PREDICTED} | estimated)
+        self._put("predicted", {name: getattr(own, name) for name in PREDICTED} | estimated, EXTREME, width)
         for stream, columns in residuals.items():
-            self._put(self._residuals[stream], columns)
+            self._put(stream, columns, ("values", "means"), width)
         if own.imu is not None:
-            self._put(self._imu, {each.name: getattr(own.imu, each.name) for each in fields(ImuTrace)})
-        self._shapes.add(own.shapes)
+            columns = {each.name: getattr(own.imu, each.name) for each in fields(ImuTrace)}
+            self._put("imu", columns, ("measured", "predicted"), width)
+        for shape in own.shapes:
+            if not self._shapes or abs(shape[0] - self._shapes[-1][0]) >= width:
+                self._shapes.append(shape)
         return own
 
     def _note_peak(self, own: History) -> None:
@@ -103,61 +110,33 @@ class HistoryBuilder:
         if np.isfinite(size).any() and float(np.nanmax(size)) > self._peak:
             self._peak, self._peak_at = float(np.nanmax(size)), float(own.stamps_s[np.nanargmax(size)])
 
-    def _put(self, table: ExtremeRows, columns: dict[str, Array]) -> None:
-        table.add(columns)
-        if table.is_full:
-            table.thin(self._enlarged(table))
-
-    def _enlarged(self, table: ExtremeRows) -> NDArray[np.bool_]:
-        """Return True for rows that are, or may be, shown enlarged: about the peak, and the newest."""
-        stamps = next(iter(table.columns.values()))
-        if table is not self._predicted and table is not self._imu:
-            return np.zeros(len(stamps), bool)
-        return np.asarray((np.abs(stamps - self._peak_at) <= ENLARGED_SPAN) | (stamps >= stamps[-1] - ENLARGED_SPAN))
+    def _put(self, key: str | Stream, columns: dict[str, Array], names: Sequence[str], width: float) -> None:
+        """Keep rows: if bins have a `width` (s), those with extremes of the columns `names`, and those about the peak."""
+        times = next(iter(columns.values()))
+        if width:
+            kept = extremes((times / width).astype(np.int64), [columns[name] for name in names])
+            kept |= np.abs(times - self._peak_at) <= ENLARGED_SPAN
+            columns = {name: column[kept] for name, column in columns.items()}
+        for name, column in columns.items():
+            self._tables.setdefault(key, {}).setdefault(name, []).append(column)
 
     def history(self, recording: Recording) -> History:
         """Return the history of all stretches so far; at least one."""
-        for table in (self._predicted, self._imu, *self._residuals.values()):
-            if table.is_thin:
-                table.thin(self._enlarged(table))  # the newest ones as those before
-        found: dict[str, Any] = self._predicted.columns
-        load = recording.totals.load.load
-        tables = {stream: table.columns for stream, table in self._residuals.items() if table.columns}
+        tables: dict[Any, dict[str, Any]] = {
+            key: {name: np.concatenate(parts) for name, parts in table.items()} for key, table in self._tables.items()
+        }
+        found, load = tables["predicted"], recording.totals.load.load
         return History(
             **{name: found[name] for name in PREDICTED},
             residuals=_residuals(len(self._scene.joints), tables),
-            imu=ImuTrace(**self._imu.columns) if self._imu.columns else None,
-            shapes=self._shapes.kept,
+            imu=ImuTrace(**tables["imu"]) if "imu" in tables else None,
+            shapes=self._shapes,
             gaps=[((start - recording.first) * NANO, (end - recording.first) * NANO) for start, end in recording.gaps],
             alarms=_alarms(recording, float(found["stamps_s"][-1])),
             distributions=self._distributions.distributions,
             estimate=None if load is None else EstimateTrace(*(found[name] for name in ESTIMATED)),
             load_text="" if load is None else load.text,
         )
-
-
-class _Shapes:
-    """Shapes with their times: every one, then every second, fourth, ..; and the newest."""
-
-    def __init__(self) -> None:
-        self._count, self._step = 0, 1
-        self._chosen: list[tuple[int, tuple[float, Array]]] = []
-        self._newest: list[tuple[float, Array]] = []
-
-    def add(self, found: list[tuple[float, Array]]) -> None:
-        most_shapes = 1024  # shapes of the boom that are kept, of which pictures show two dozen
-        numbered = enumerate(found, self._count)
-        self._chosen += [(number, shape) for number, shape in numbered if number % self._step == 0]
-        self._count += len(found)
-        self._newest = found[-1:] or self._newest
-        while len(self._chosen) > most_shapes:
-            self._step *= 2
-            self._chosen = [each for each in self._chosen if each[0] % self._step == 0]
-
-    @property
-    def kept(self) -> list[tuple[float, Array]]:
-        is_last = bool(self._chosen) and self._chosen[-1][0] == self._count - 1
-        return [shape for _, shape in self._chosen] + ([] if is_last else self._newest)
 
 
 def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan, residuals: Residuals) -> History:

@@ -20,6 +20,7 @@ from ..scene.schema import Scene
 from ..twin.twin import Twin
 from ..types import NANO, SENSORS, Health, Stream, streams_of
 from .progress import Progress
+from .session_samples import topics_read
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,6 @@ class ReplayInputs:
     settings: Settings
     mapping: str  # source of the mapping
     topics: Topics
-    wanted: list[str]  # input topics to read: that which drives the model, and those of other inputs with messages
     strokes: SessionStrokes
     streams: tuple[Stream, ...]  # of the sensors that the mapping has; gyros only if the session's messages hold their readings
     health: bool  # True if the rig's health is judged
@@ -65,9 +65,14 @@ class ReplayInputs:
     @property
     def expected(self) -> int:
         """Approximate number of messages to read."""
-        session = self.session
-        count = sum(map(session.count, self.wanted))
-        return round(count * self.window.share((session.end - session.start) * NANO))
+        count = sum(map(self.session.count, topics_read(self.session, self.topics)))
+        return round(count * self.window.share((self.session.end - self.session.start) * NANO))
+
+    @property
+    def length(self) -> float:
+        """Length of what is read, s, by log times."""
+        whole = (self.session.end - self.session.start) * NANO
+        return whole * self.window.share(whole)
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -114,22 +119,18 @@ def replay_inputs(
     topics = mapped.topics.of_scene(joints)
     if not topics.areas and session.count(topics.inputs[Stream.PRESSURES].name):
         raise UsageError(f"{session.path}: {NO_AREAS}")
-    drive = topics.stroke_reading.stream
-    wanted = [name for name, streams in topics.streams_by_topic.items() if drive in streams or session.count(name)]
     strokes = strokes_of(session.path, mapped)
     refuse_conflicts(session, topics, len(joints), kept.source)
     streams = tuple(
         stream
         for stream in streams_of(topics.places)
-        if not SENSORS[stream].beside or _imu_has_rates(session, topics.inputs[Stream(SENSORS[stream].beside)], wanted)
+        if not SENSORS[stream].beside or _imu_has_rates(session, topics.inputs[Stream(SENSORS[stream].beside)])
     )
-    return ReplayInputs(
-        session, kept, settings, mapped.source, topics, wanted, strokes, streams, options.health, options.window
-    )
+    return ReplayInputs(session, kept, settings, mapped.source, topics, strokes, streams, options.health, options.window)
 
 
-def _imu_has_rates(session: Session, topic: InputTopic, wanted: list[str]) -> bool:
-    if topic.name not in wanted:
+def _imu_has_rates(session: Session, topic: InputTopic) -> bool:
+    if not session.count(topic.name):
         return False
     first = next(iter(read(session, {topic.absolute: topic.type})), None)
     return first is not None and first[2].angular_velocity_covariance[0] != NO_MEASUREMENT

@@ -22,7 +22,6 @@ from ..types import NANO, SENSORS, USUAL_STREAMS, Alarm, Array, Health, Stream, 
 from .ground_truth import TipErrors
 
 STRETCH = 2**14  # predictions in a stretch, at least: 82 s at 200 Hz, some 30 MB
-MOST_STEPS = 64  # different differences of readings; noise that is not read out in coarse steps has more
 
 
 class ResidualRows(NamedTuple):
@@ -52,6 +51,7 @@ class Stretch:
     samples: list[SampleBlock]  # read meanwhile
     reads: StrokeReading  # of the strokes of the predictions
     streams: Collection[Stream]  # of the session's sensors
+    length: float  # of the whole session, s, by its log times; 0 if it is not known
 
     @property
     def predictions(self) -> PredictionBlock:
@@ -97,27 +97,23 @@ class SessionTotals:
 
 
 class ReadOut:
-    """Steps in which sensors are read out, by the differences of successive readings."""
+    """Steps in which sensors are read out: the smallest change from one reading to the next of any sensor of a stream."""
 
     def __init__(self) -> None:
-        self._steps: dict[int, set[float]] = {}  # by the code of their stream
+        self._steps: dict[int, float] = {}  # by the code of their stream
 
     def add(self, samples: SampleBlock) -> None:
         """Add a block of samples."""
         for code in np.unique(samples.streams).tolist():
-            steps = self._steps.setdefault(code, set())
-            if len(steps) <= MOST_STEPS:
-                apart = np.abs(np.diff(samples.values[samples.streams == code], axis=0))
-                steps.update(np.unique(np.round(apart[apart > 0.0], 9)).tolist())
+            changes = np.abs(np.diff(samples.values[samples.streams == code], axis=0))
+            self._steps[code] = min(self._steps.get(code, np.inf), changes[changes > 1e-9].min(initial=np.inf))
 
     def coarse(self, settings: Settings) -> dict[str, list[str]]:
-        """Return a sentence for each stream with steps q where q^2 / 12 exceeds the stated variance s^2 + r^2 / 12."""
+        """Return a sentence for each stream with a step q where q^2 / 12 exceeds the stated variance s^2 + r^2 / 12."""
         found = []
-        for code, steps in self._steps.items():
-            kind, q = SENSORS[STREAMS[code]], min(steps, default=np.nan)
-            noise, stated = (getattr(settings, name) if name else np.inf for name in (kind.noise, kind.resolution))
-            is_even = len(steps) <= MOST_STEPS and all(abs(step / q - round(step / q)) < 1e-3 for step in steps)
-            if is_even and q**2 > 12.0 * noise**2 + stated**2:
+        for code, q in self._steps.items():
+            kind = SENSORS[STREAMS[code]]
+            if kind.resolution and np.isfinite(q) and q**2 > 12.0 * settings.variance(kind):
                 told = f"{kind.title}: readings come in steps of {q:g} (SI units): set {kind.resolution} to that"
                 found.append(f"{told}, or sensors look stuck or noisy")
         return {"read_out": found} if found else {}
@@ -137,8 +133,10 @@ class Recording:
         errors: TipErrors | None = None,
         reads: StrokeReading = StrokeReading.LENGTH,
         streams: Collection[Stream] = USUAL_STREAMS,
+        length: float = 0.0,
     ) -> None:
         self._joints, self._take, self._errors, self.reads, self._streams = joints, take, errors, reads, streams
+        self._length = length
         self._parts: list[ReportBlock] = []
         self._health: list[Health] = []
         self._samples: list[SampleBlock] = []
@@ -146,7 +144,6 @@ class Recording:
         self._newest: int | None = None
         self.first = 0  # stamp of the first prediction, ns
         self._count = self._before = 0  # predictions so far, and those in earlier stretches
-        self._rows_by_first_clock: int | None = None
         self._whole: Stretch | None = None
         self.gaps: list[tuple[int, int]] = []  # stamps (ns) between which strokes paused
         self.clock_sets: list[tuple[int, int]] = []  # stamps (ns) before and after a clock was set back
@@ -184,8 +181,6 @@ class Recording:
         for found, kinds in ((self.gaps, {"gap", "restart"}), (self.clock_sets, {"jump back"})):
             if before is not None and events & kinds:
                 found.append((before, int(predictions.stamps[at])))
-        if self.clock_sets and self._rows_by_first_clock is None:
-            self._rows_by_first_clock = self._count + at
 
     def close(self) -> None:
         """Complete the last stretch; to be called once, after the last `add`."""
@@ -203,7 +198,7 @@ class Recording:
             return
         self.totals.add(stretch)
         if self._errors is not None:
-            self._errors.add(stretch.predictions, self._by_first_clock(self._before), stretch.estimates)
+            self._errors.add(stretch.predictions, stretch.estimates)
         self._before = self._count
         if self._take is None:
             self._whole = stretch
@@ -212,7 +207,7 @@ class Recording:
 
     def _stretch(self) -> Stretch | None:
         parts = [part for part in self._parts if len(part.predictions.stamps) or len(part.residuals.stamps)]
-        own = self._health, self.first, self._samples, self.reads, self._streams
+        own = self._health, self.first, self._samples, self.reads, self._streams, self._length
         return Stretch(self._joints, joined(parts), *own) if parts else None
 
     @property
@@ -231,13 +226,6 @@ class Recording:
         """
         span = (self._newest or 0) - self.first
         return (span - sum(after - before for before, after in self.clock_sets)) * NANO
-
-    def _by_first_clock(self, before: int) -> slice:
-        """Return the rows before a clock was set, in a stretch with so many predictions before it.
-
-        Their stamps tell the time since the first one.
-        """
-        return slice(None if self._rows_by_first_clock is None else max(0, self._rows_by_first_clock - before))
 
     def alarms(self) -> list[Alarm]:
         """Return all alarms, each once with its latest values, in the order of their beginning."""

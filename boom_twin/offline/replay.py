@@ -189,7 +189,7 @@ def replay_into(
     """
     given = replay_inputs(Path(bag), scene, settings, options)
     session, joints = given.session, len(given.scene.joints)
-    truth = truth_in(options.window, session, given.topics, given.wanted)
+    truth = truth_in(options.window, session, given.topics)
     errors = None if truth is None else TipErrors(truth)
     spent = 0.0  # s, of `take`, which is no part of the replay
 
@@ -200,8 +200,9 @@ def replay_into(
             take(stretch)
             spent += time.perf_counter() - began
 
-    recording = Recording(joints, None if take is None else timed, errors, given.strokes.reading, given.streams)
-    samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
+    given_away = None if take is None else timed
+    recording = Recording(joints, given_away, errors, given.strokes.reading, given.streams, given.length)
+    samples = SessionSamples(session, given.topics, joints, options.window)
     with ExitStack() as stack:
         twin, put = given.twin(options.causes), None
         stack.callback(twin.close)
@@ -259,7 +260,7 @@ def _first_refused(given: ReplayInputs) -> str:
     """Return a sentence on the first stroke, or angle that drives the model, outside its sensor's range; empty without one."""
     stream, joints = given.strokes.reading.stream, len(given.scene.joints)
     low, high = sensor_ranges(given.scene, given.topics.mounts(joints))[stream]
-    for item in SessionSamples(given.session, given.topics, given.wanted, joints, given.window):
+    for item in SessionSamples(given.session, given.topics, joints, given.window):
         if isinstance(item, SampleBlock):
             values = item.values[item.streams == CODES[stream], :joints]
             for row, i in np.argwhere((values < low) | (values > high)):

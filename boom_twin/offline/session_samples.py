@@ -69,11 +69,18 @@ def recorded_changes(session: Session, topics: Topics) -> Changes:
     return Changes((log, decode_changes(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
 
 
+def topics_read(session: Session, topics: Topics) -> dict[str, str]:
+    """Return types by name of the inputs that are read: that which drives the model, and others that have messages."""
+    drive, heard = topics.stroke_reading.stream, topics.streams_by_topic
+    names = [name for name, streams in heard.items() if drive in streams or session.count(name)]
+    return {name: topics.inputs[heard[name][0]].type for name in names}
+
+
 class SessionSamples:
     """Samples of a session, many at a time; iterate once. Only the `window` of the session is read."""
 
-    def __init__(self, session: Session, topics: Topics, wanted: list[str], joints: int, window: TimeWindow = WHOLE) -> None:
-        self._session, self._topics, self._wanted, self._window = session, topics, wanted, window
+    def __init__(self, session: Session, topics: Topics, joints: int, window: TimeWindow = WHOLE) -> None:
+        self._session, self._topics, self._window = session, topics, window
         self._joints, self._decoder = joints, SampleDecoder(joints, topics)
         self._waiting: list[SampleBlock] = []
         self._refused = 0  # messages that were told
@@ -91,8 +98,7 @@ class SessionSamples:
         batch = 400  # messages in one block, at least
         heard, session = self._topics.streams_by_topic, self._session
         changes = recorded_changes(session, self._topics)
-        types = {name: self._topics.inputs[heard[name][0]].type for name in self._wanted}
-        blocks, count = read_blocks(session, types, self._window), 0
+        blocks, count = read_blocks(session, topics_read(session, self._topics), self._window), 0
         streams, drive = [heard[source.name] for source in blocks.sources], self._topics.stroke_reading.stream
         wires = [decoder_of(group) for group in streams]
         for block in blocks:

@@ -18,7 +18,6 @@ from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, TONES, legend_ab
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.text import Annotation
 
 
 COLOURS = {"kN": ORANGE, "Hz": GREEN, "kN m": PURPLE, "MPa": SKY}  # colours of bars, by unit
@@ -31,13 +30,9 @@ def envelope_picture(path: Path, scene: Scene, found: Envelope, ranges: list[tup
     with picture(path, "Envelope over the working range", note, (18.0, 11.0)) as figure:
         grid = figure.add_gridspec(len(units) or 1, 2, width_ratios=[1.35, 1.0])
         _tips(figure.add_subplot(grid[:, 0]), scene, found)
-        bars = []
         for row, unit in enumerate(units):
             own = [(words.rpartition(", ")[0], values) for words, values in ranges if words.rpartition(", ")[2] == unit]
-            bars.append((axes := figure.add_subplot(grid[row, 1]), _bars(axes, found, own, unit)))
-        figure.draw_without_rendering()
-        for axes, labels in bars:
-            _make_room(axes, labels)
+            _bars(figure.add_subplot(grid[row, 1]), found, own, unit)
 
 
 def _tips(axes: Axes, scene: Scene, found: Envelope) -> None:
@@ -62,43 +57,20 @@ def _tips(axes: Axes, scene: Scene, found: Envelope) -> None:
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=11)
 
 
-def _bars(axes: Axes, found: Envelope, own: list[tuple[str, Array]], unit: str) -> list[Annotation]:
-    """Draw one bar for each quantity from its least to its greatest value; the ends are labelled with value and posture."""
-    labels = []
+def _bars(axes: Axes, found: Envelope, own: list[tuple[str, Array]], unit: str) -> None:
+    """Draw one bar for each quantity from its least to its greatest value; values and postures of its ends are above it."""
     for place, (_, values) in enumerate(own):
         low, high = int(values.argmin()), int(values.argmax())
-        axes.barh(place, values[high] - values[low], left=values[low], height=0.5, color=COLOURS.get(unit, GREY), alpha=0.8)
-        for row, side in ((low, "right"), (high, "left")):
-            gap = -4 if side == "right" else 4
-            label = axes.annotate(
-                f"{float(f'{values[row]:.3g}'):g} {found.posture(row)}", (values[row], place), (gap, 0),
-                textcoords="offset points", ha=side, va="center", fontsize=9, color=INK,
-            )  # fmt: skip
-            label.set_in_layout(False)  # it has its room within the axes
-            labels.append(label)
+        axes.barh(place, values[high] - values[low], left=values[low], height=0.4, color=COLOURS.get(unit, GREY), alpha=0.8)
+        ends = (f"{float(f'{values[row]:.3g}'):g} in {found.posture(row)}" for row in (low, high))
+        axes.annotate(
+            " to ".join(ends), (0.01, place - 0.25), xycoords=axes.get_yaxis_transform(), va="bottom", fontsize=9, color=INK
+        )
+    axes.use_sticky_edges = False
     axes.set_yticks(range(len(own)), [words for words, _ in own])
-    axes.invert_yaxis()
+    axes.set_ylim(len(own) - 0.6, -0.75)
     axes.grid(False, axis="y")
     axes.set_xlabel(unit)
-    return labels
-
-
-def _make_room(axes: Axes, labels: list[Annotation]) -> None:
-    """Set limits of x between which bars and labels, left and right of their ends, fit into the width of drawn axes."""
-    least_bar_width = 0.1  # of the width, that is left for bars however long the words are
-    gap = 16.0  # pixels between a bar, its words and the edge
-    width = axes.get_window_extent().width
-    ends = np.array([label.xy[0] for label in labels])
-    room = np.array([label.get_window_extent().width + gap for label in labels])
-    sides = np.array([-1.0 if label.get_horizontalalignment() == "right" else 1.0 for label in labels])
-    span = float(np.ptp(ends)) or 1.0
-    for share in np.linspace(1.0, least_bar_width, 50):  # of the width, for what the bars span
-        reach = ends + sides * room * span / (share * width)
-        if np.ptp(reach) <= span / share:
-            break
-    axes.set_xlim(reach.min(), reach.max())
-    if ends.min() >= 0.0:  # there are no negative frequencies and stresses, only room for words
-        axes.set_xticks([tick for tick in axes.get_xticks() if 0.0 <= tick <= reach.max()])
 
 
 def response_picture(path: Path, title: str, unit: str, response: FrequencyResponse, natural: Array) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -101,8 +101,8 @@ class SessionDistributions:
 class History:
     """Everything predicted in a replay of m stroke samples, and the residuals; n joints.
 
-    Of a long session, rows are left out between those that hold the extremes, see `ExtremeRows`. Then
-    `distributions` are given, which do not follow from the rows that are left.
+    Of a long session, rows are left out between those that hold the extremes. Then `distributions` are given, which do not
+    follow from the rows that are left.
     """
 
     stamps_s: Array  # (m,)
@@ -124,50 +124,6 @@ class History:
     load_text: str = ""  # size and main frequency of its load, in words
     natural: Array = field(default_factory=lambda: np.zeros((0, 2)))  # (modes, 2), Hz: least and largest over the postures
     section_middles: tuple[int, ...] = ()  # points of `shapes` nearest to the middles of the sections
-
-
-class ExtremeRows:
-    """Table of arrays side by side, `columns`, that keeps all rows while they are few, and of more rows the extremes in bins.
-
-    A row stays if it has the least or the largest value of a key in its bin of consecutive rows. So a curve through the rows
-    that are left spans in every bin what all rows spanned. Bins get twice as wide whenever `most` rows are not enough: the
-    extremes of a wide bin are among those of its halves. `keys` are the columns whose extremes are to be seen.
-    """
-
-    def __init__(self, most: int, keys: Sequence[str]) -> None:
-        self.columns: dict[str, Array] = {}
-        self._most, self._keys, self._width, self._count = most, keys, 1, 0
-        self._numbers: NDArray[np.int64] = np.zeros(0, np.int64)
-
-    def add(self, columns: Mapping[str, Array]) -> None:
-        """Append rows, shapes (k, ..)."""
-        rows = len(next(iter(columns.values())))
-        self._numbers = np.concatenate([self._numbers, self._count + np.arange(rows)])
-        self._count += rows
-        held = self.columns or {name: column[:0] for name, column in columns.items()}
-        self.columns = {name: np.concatenate([held[name], column]) for name, column in columns.items()}
-
-    @property
-    def is_thin(self) -> bool:
-        return self._width > 1
-
-    @property
-    def is_full(self) -> bool:
-        return len(self._numbers) > self._most
-
-    def thin(self, kept: NDArray[np.bool_]) -> None:
-        """Remove rows until at most half of the permitted number are left, not counting those `kept`, bool (k,), which stay."""
-        kept = self._take_away(kept)
-        while len(self._numbers) - int(kept.sum()) > self._most // 2 and self._width < self._count:
-            self._width *= 2
-            kept = self._take_away(kept)
-
-    def _take_away(self, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Remove rows with the present width of bins; return which of the rows that are left are kept anyhow."""
-        stays = kept | extremes(self._numbers // self._width, [self.columns[key] for key in self._keys])
-        self._numbers = self._numbers[stays]
-        self.columns = {name: column[stays] for name, column in self.columns.items()}
-        return kept[stays]
 
 
 def extremes(bins: NDArray[np.int64], keys: Sequence[Array]) -> NDArray[np.bool_]:

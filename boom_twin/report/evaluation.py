@@ -51,27 +51,27 @@ def evaluated_replay(
 
     Fatigue is computed for a detail `category` (MPa), without one not at all. `also` is given each stretch too.
     """
-    history, quantities, rests = HistoryBuilder(scene.scene), QuantityBuilder(scene.scene), RestFinder(scene.scene)
+    history, quantities, finder = HistoryBuilder(scene.scene), QuantityBuilder(scene.scene), RestFinder(scene.scene)
+    rests = list[RestPeriod]()
     fatigue = None if category is None else FatigueCounter(scene.scene, category)
 
     def take(stretch: Stretch) -> None:
         own, estimates = history.add(stretch), stretch.estimates
         quantities.add(own, estimates.load, estimates.load_variance)
-        rests.add(own, estimates.load)
+        rests.extend(finder.find(own, estimates.load))
         if fatigue is not None:
             fatigue.add(own)
         if also is not None:
             also(stretch)
 
     result = replay_into(building, bag, scene, settings, options, take)
-    measured = rests.finish()
-    found = quantities.quantities(result.recording.totals.tip_sigma, measured)
+    found = quantities.quantities(result.recording.totals.tip_sigma, rests)
     write(building, scene.scene, found)
     return Evaluation(
         result,
         scene.scene,
         history.history(result.recording),
-        measured,
+        rests,
         quantities.loads.most_loaded(),
         [] if fatigue is None else fatigue.results(),
         category,

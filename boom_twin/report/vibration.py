@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,23 +19,6 @@ SPEED_SPAN = 0.2  # s over which that speed is taken
 SHORTEST_REST = 3.0  # s; shorter rest periods are not evaluated
 EVALUATED = 60.0  # s of a rest period that are evaluated; free vibration has died away then, and memory goes by its square
 MODE_DISTANCE = 0.2  # relative distance up to which a vibration belongs to the nearest mode of the model
-
-
-class Series(NamedTuple):
-    """Values (k, c) at times (k,) in s."""
-
-    times: Array
-    values: Array
-
-    def followed_by(self, more: Series) -> Series:
-        """Return both in a row; only `more` if its channels are others."""
-        if self.values.shape[1] != more.values.shape[1]:
-            return more
-        return Series(np.concatenate([self.times, more.times]), np.concatenate([self.values, more.values]))
-
-    def between(self, start: float, stop: float = inf) -> Series:
-        inside = (self.times >= start) & (self.times < stop)
-        return Series(self.times[inside], self.values[inside])
 
 
 def vibrations(times: Array, values: Array) -> list[Vibration]:
@@ -75,56 +56,32 @@ class RestPeriod:
 
 
 class RestFinder:
-    """Search for the rest periods of a session that last `SHORTEST_REST`; of a long one, `EVALUATED` seconds are used."""
+    """Search for the rest periods that last `SHORTEST_REST`; of a long one, `EVALUATED` seconds are used."""
 
     def __init__(self, scene: Scene) -> None:
         shaking_load = 0.003  # share of the boom's weight: standard deviation of a load at the tip that shakes the boom
         self._modes, self._least_load = ModeList(scene), shaking_load * weight_of(scene)
-        self._found: list[RestPeriod] = []
-        nothing = Series(np.zeros(0), np.zeros((0, 0)))
-        self._strokes = self._motion = self._load = nothing  # from where a rest period may have begun
-        self._evaluated_to = -inf  # s; end of a rest period of `EVALUATED` seconds, which may go on
 
-    def add(self, history: History, load: Array) -> None:
-        """Add the next rows, all of them; a rest period that lasts to their end waits for those that follow.
+    def find(self, history: History, load: Array) -> list[RestPeriod]:
+        """Return the rest periods in the rows of a part of a session. One that goes on in the next part is another one there.
 
         `load`, shape (rows, 2), is the estimated load at the tip (N), NaN without sensors.
         """
-        self._strokes = self._strokes.followed_by(Series(history.stamps_s, history.strokes))
-        self._load = self._load.followed_by(Series(history.stamps_s, load))
-        self._motion = self._motion.followed_by(measured_motion(history))
-        needed = self._evaluate(is_last=False)
-        self._strokes, self._motion, self._load = (each.between(needed) for each in (self._strokes, self._motion, self._load))
+        times, motion = history.stamps_s, measured_motion(history)
+        spans = [span for part in unbroken(times) for span in still(times[part], history.strokes[part])]
+        return [
+            self._rest(start, min(stop, start + EVALUATED), history, load, motion)
+            for start, stop in spans
+            if stop - start >= SHORTEST_REST
+        ]
 
-    def finish(self) -> list[RestPeriod]:
-        """Return all rest periods; to be called once, after the last `add`."""
-        self._evaluate(is_last=True)
-        return self._found
-
-    def _evaluate(self, is_last: bool) -> float:
-        """Evaluate the rest periods that have ended; return from where on (s) rows are still needed."""
-        times, strokes = self._strokes
-        if not len(times):
-            return 0.0
-        needed = float(times[-1]) - SPEED_SPAN
-        for start, stop in [span for part in unbroken(times) for span in still(times[part], strokes[part])]:
-            is_open = not is_last and stop > times[-1] - SPEED_SPAN
-            if start <= self._evaluated_to:
-                self._evaluated_to = stop
-            elif is_open and stop - start < EVALUATED:
-                needed = start - SPEED_SPAN
-            elif stop - start >= SHORTEST_REST:
-                self._found.append(self._rest(start, min(stop, start + EVALUATED)))
-                self._evaluated_to = stop if is_open else self._evaluated_to
-        return needed
-
-    def _rest(self, start: float, stop: float) -> RestPeriod:
+    def _rest(self, start: float, stop: float, history: History, load: Array, motion: tuple[Array, Array]) -> RestPeriod:
         cycle_sigma = 0.02  # largest deviation of a frequency, in cycles of the rest period; in noise alone about 0.2
-        strokes, motion, load = (each.between(start, stop) for each in (self._strokes, self._motion, self._load))
-        model = self._modes.at(np.median(strokes.values, axis=0).tolist())
-        if float(np.hypot(*load.values.std(axis=0))) > self._least_load:
+        rows, inside = ((times >= start) & (times < stop) for times in (history.stamps_s, motion[0]))
+        model = self._modes.at(np.median(history.strokes[rows], axis=0).tolist())
+        if float(np.hypot(*load[rows].std(axis=0))) > self._least_load:
             return RestPeriod(start, stop, model, {}, True)
-        found = [each for each in vibrations(*motion) if is_free(each)]
+        found = [each for each in vibrations(motion[0][inside], motion[1][inside]) if is_free(each)]
         certain = [each for each in found if each.frequency_sigma * (stop - start) < cycle_sigma]
         return RestPeriod(start, stop, model, _by_mode(certain, model), False)
 
@@ -141,17 +98,17 @@ def still(times: Array, strokes: Array) -> list[tuple[float, float]]:
     return [(float(times[a]), float(times[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def measured_motion(history: History) -> Series:
-    """Return the IMU's specific force (m/s^2), or without one the angles (rad)."""
+def measured_motion(history: History) -> tuple[Array, Array]:
+    """Return times (k,) in s and the IMU's specific force (k, 2) in m/s^2, or without one the angles (k, n) in rad."""
     if history.imu is not None:
-        return Series(history.imu.stamps_s, history.imu.measured)
+        return history.imu.stamps_s, history.imu.measured
     angles = [trace for name, trace in history.residuals.items() if stream_of(name) is Stream.ANGLES]
     if not angles:
-        return Series(np.zeros(0), np.zeros((0, 0)))
+        return np.zeros(0), np.zeros((0, 0))
     left = np.column_stack([trace.values for trace in angles])
     there = np.isfinite(left).any(axis=1)
     times = angles[0].stamps_s[there]
-    return Series(times, left[there] + np.column_stack([np.interp(times, history.stamps_s, each) for each in history.joints.T]))
+    return times, left[there] + np.column_stack([np.interp(times, history.stamps_s, each) for each in history.joints.T])
 
 
 def _by_mode(found: list[Vibration], model: list[float]) -> dict[int, Vibration]:

@@ -132,7 +132,8 @@ def test_no_recording_is_written_over(scene: Path, tmp_path: Path, capsys: pytes
 
 
 def test_further_sensors_are_recorded_with_the_mapping_that_places_them(scene: Path) -> None:
-    more = ["--imu", "1:1.5:0.5236", "--point", "1:3.0", "--pressures", "0.12:0.07", "--sensors", "angles,imu,gyro"]
+    placed = "imu@1:1.5:0.5236,gyro@1:1.5:0.5236,point@1:3.0"
+    more = ["--sensors", f"angles,imu,gyro,{placed}", "--pressures", "0.12:0.07"]
     bag = made(scene, scene.with_name("placed"), *more)
     summary = replayed(scene, bag)
     rows = [
@@ -156,9 +157,10 @@ def test_further_sensors_are_recorded_with_the_mapping_that_places_them(scene: P
         (["--load", "wind:15@3"], "begins at 3 s, must be before the end at 3 s."),
         (["--fault", "joint_2.sensor:stuck"], "the boom has joints, cylinders and sections 1 to 1."),
         (["--rate", "20"], "rate = 20, must be from 50 to 1000 Hz"),
-        (["--imu", "2:1.0"], "the boom has sections 1 to 1"),
-        (["--imu", "1:4"], "section 1 reaches from 0 to 3 m"),
-        (["--moment", "1:1.0"], "section 1 is rigid; strain is read on a beam only"),
+        (["--sensors", "imu@2:1.0"], "the boom has sections 1 to 1"),
+        (["--sensors", "angles,imu@1:4"], "section 1 reaches from 0 to 3 m"),
+        (["--sensors", "moment@1:1.0"], "section 1 is rigid; strain is read on a beam only"),
+        (["--sensors", "point@1:1,point@1:2,point@1:3"], "at most 2 of its kind are possible on a boom"),
         (["--pressures"], "not every cylinder of the scene has `oil"),
         (["--pressures", "0.1:0.07", "--sensors", "forces"], "a cylinder has one force"),
     ],

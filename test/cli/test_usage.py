@@ -75,6 +75,10 @@ def test_quiet_leaves_out_what_is_no_result_and_no_failure(tmp_path: Path, capsy
     assert main(["info", session, "--quiet"]) == 0
     quiet = capsys.readouterr()
     assert loud.out == quiet.out and loud.err.startswith("scene: ") and quiet.err == ""
+    odd = tmp_path / "odd.yaml"
+    odd.write_text(default_text().replace("gravity: [0.0, -9.81]", "gravity: [0.0, -1.62]"))
+    assert main(["info", session, "--scene", str(odd), "--quiet"]) == 0
+    assert capsys.readouterr().err.startswith(f"warning: {odd}: ")
     assert main(["info", str(tmp_path), "--quiet"]) == 1
     assert capsys.readouterr().err.startswith("boom_twin info: ")
 

@@ -32,9 +32,8 @@ twin.warm_up()
 kernels = update, write_residual, survey, summarise, find
 ready = [len(kernel.dispatcher.signatures) for kernel in kernels]
 session = scan(path)
-wanted = [name for name in topics.streams_by_topic if (found := session.find(name)) is not None and found.count]
 told = 0
-for item in SessionSamples(session, topics, wanted, 4):
+for item in SessionSamples(session, topics, 4):
     if isinstance(item, SampleBlock) and told < 3:
         told += len(twin.take(item).health)
 print(ready, [len(kernel.dispatcher.signatures) for kernel in kernels], told)

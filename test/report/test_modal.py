@@ -48,10 +48,9 @@ def test_where_a_load_shakes_the_boom_no_frequency_is_told(load: float, payload:
     scene = with_parameters(load_scene(), {"tip.payload": payload})
     imu = SimpleNamespace(stamps_s=TIMES, measured=measured(3))
     strokes = np.tile(strokes_of_posture(scene, "arch"), (len(TIMES), 1))
-    finder = RestFinder(scene)
     history = SimpleNamespace(stamps_s=TIMES, strokes=strokes, imu=imu)
-    finder.add(history, load * np.sin(2.7 * TIMES)[:, None] * np.array([0.0, 1.0]))  # type: ignore[arg-type]
-    (rest,) = finder.finish()
+    forces = load * np.sin(2.7 * TIMES)[:, None] * np.array([0.0, 1.0])
+    (rest,) = RestFinder(scene).find(history, forces)  # type: ignore[arg-type]
     assert rest.is_shaken == is_shaken and (0 in rest.measured) == (not is_shaken and not payload)
 
 
@@ -67,15 +66,14 @@ def swung():
 def test_a_boom_on_locked_drives_rests_with_the_frequencies_of_its_drives(swung, reads: StrokeReading) -> None:
     """Whatever drives the model; lengths that are taken for drives never rest, and give other frequencies."""
     scene, found = load_scene(), []
-    twin, recording, finder = Twin(scene, reads=reads), Recording(4, found.append, reads=reads), RestFinder(scene)
+    twin, recording = Twin(scene, reads=reads), Recording(4, found.append, reads=reads)
     rows = {StrokeReading.LENGTH: swung.lengths, StrokeReading.DRIVE: swung.strokes, StrokeReading.ANGLE: swung.joints}[reads]
     times = (SECOND + np.round(SECOND * swung.times)).astype(np.int64)
     block = SampleBlock(np.full(len(times), CODES[reads.stream]), times, rows)
     recording.add(twin.take(block), block)
     recording.close()
     (stretch,) = found
-    finder.add(own := HistoryBuilder(scene).add(stretch), stretch.estimates.load)
-    (rest,) = finder.finish()
+    (rest,) = RestFinder(scene).find(own := HistoryBuilder(scene).add(stretch), stretch.estimates.load)
     assert rest.start < 1.0 and rest.stop > 4.3
     calm = [stop - start for start, stop in still(own.stamps_s, stretch.predictions.strokes)]
     assert reads is StrokeReading.DRIVE or max(calm, default=0.0) < SHORTEST_REST

@@ -20,7 +20,7 @@ from eventually import eventually
 pytest.importorskip("rclpy")
 
 from default_boom import default_text
-from recordings import mapping_of, scan, scene_of
+from recordings import mapping_of, scene_of
 from ros_messages import Output
 
 import boom_twin
@@ -204,7 +204,6 @@ NO_CPP = {"state_publisher": "false"}
         ("twin", {}, "package robot_state_publisher is not in AMENT_PREFIX_PATH: install it, or say state_publisher:=false"),
         ("twin", NO_CPP | {"scene": "/no/such/boom.yaml"}, "/no/such/boom.yaml"),
         ("twin", NO_CPP | {"params_file": "/no/such/twin.yaml"}, "/no/such/twin.yaml"),
-        ("replay", NO_CPP | {"rviz": "false", "bag": "/no/such/bag"}, "/no/such/bag"),
     ],
 )
 def test_what_fails_leaves_nothing_behind(start: Start, name: str, arguments: dict[str, str], words: str) -> None:
@@ -218,13 +217,3 @@ def test_a_node_that_cannot_start_ends_all(start: Start) -> None:
     launched = start("twin", "robot_state_publisher", frame_prefix="/front/")
     launched.end()
     assert launched.is_gone() and "frame_prefix = '/front/'" in launched.said()
-
-
-def test_a_session_is_played_into_the_twin_and_all_ends_with_it(start: Start, bag: Path, tmp_path: Path) -> None:
-    out = tmp_path / "again"
-    launched = start("replay", bag=bag, namespace="front", state_publisher="false", rviz="false", record=out)
-    assert launched.end() == 0, launched.said()
-    assert launched.is_gone() and "sent in" in launched.said() and "\r" not in launched.said()
-    found = scan(out)
-    strokes, positions = (found.find(f"/front/{name}") for name in ("cylinder_strokes", "boom_twin/tip/position"))
-    assert strokes is not None and positions is not None and min(strokes.count, positions.count) > 100

@@ -47,7 +47,7 @@ def quiet_signals() -> Iterator[None]:
 
 CASES = [
     (["-p", "payload:=40.0"], "-p payload:=40.0: unknown. Parameters and remappings follow --ros-args"),
-    (["--ros-args", "-p", "look_step:=0.03"], "look_step: without effect since 0.2.0"),
+    (["--ros-args", "-p", "look_step:=0.03"], "look_step: unknown. The nearest is"),
     (["--ros-args", "--params-file", "/nowhere.yaml"], "/nowhere.yaml"),
     (["--ros-args", "-p", "strok_rate:=0.4"], "strok_rate: unknown. The nearest is `stroke_rate`"),
     (["--ros-args", "-p", "frame_prefix:=/front/"], "names of frames have no leading slash (tf2). Give 'front/'"),

@@ -81,12 +81,11 @@ def bag_feed(
     session, topics = given.session, given.topics.reading(given.strokes.reading)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[PUBLISHED_OUTPUT].absolute in counts
-    length = (session.end - session.start) * NANO
     store = Store(max(counts.values(), default=1), keeps_statuses=True)
     reads = given.strokes.reading
     if not is_published and topics.inputs[reads.stream].absolute not in counts:
         raise BagError(f"{path}: nothing to show. It needs {reads.named}, or outputs of the twin.")
-    feed = BagFeed(_title(session, is_published), store, topics, given.scene, length * window.share(length), namespace)
+    feed = BagFeed(_title(session, is_published), store, topics, given.scene, given.length, namespace)
     if is_published:
         feed.begin(_take_published(session, feed, topics, counts, window))
     else:
@@ -124,7 +123,7 @@ def _take_predicted(feed: BagFeed, topics: Topics, given: ReplayInputs, twin: Tw
         compiling.join(READING_TIME)
         yield
     feed.phase = ""
-    samples = SessionSamples(given.session, topics, given.wanted, twin.twin.plan.joints, given.window).samples()
+    samples = SessionSamples(given.session, topics, twin.twin.plan.joints, given.window).samples()
     for step in drive(twin.twin, twin.twin.update, samples):
         if step is not None:
             twin.took(*step)

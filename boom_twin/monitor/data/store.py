@@ -170,8 +170,13 @@ class MalformedError(Exception):
     """Error of a message that cannot be used; the text states why."""
 
 
+def is_logged(count: int) -> bool:
+    """Return True for the first, second, fourth, eighth, .. event of a kind, so that a flood of them does not fill the log."""
+    return count & (count - 1) == 0
+
+
 class DroppedMessages:
-    """Counter of dropped messages; each is logged, at the rate of `boom_twin.monitor.access_control.LogRateLimit`."""
+    """Counter of dropped messages, which are logged, see `is_logged`."""
 
     def __init__(self) -> None:
         self.by_topic: dict[str, dict[str, Any]] = {}  # topic, count, and reason of the last one
@@ -193,7 +198,8 @@ class DroppedMessages:
     def _add(self, topic: str, reason: str) -> None:
         count = self.by_topic[topic]["count"] + 1 if topic in self.by_topic else 1
         self.by_topic[topic] = {"topic": topic, "count": count, "reason": printable(reason[:LONGEST_REASON], keep="")}
-        LOG.getChild(topic).warning("dropped message %d of %s: %s", count, topic, self.by_topic[topic]["reason"])
+        if is_logged(count):
+            LOG.warning("dropped message %d of %s: %s", count, topic, self.by_topic[topic]["reason"])
 
 
 def check_stamp(msg: Any) -> int:

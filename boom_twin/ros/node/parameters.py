@@ -14,7 +14,7 @@ from rclpy.exceptions import InvalidParameterTypeException, ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ...config.settings import RETIRED, Settings, Table, Thresholds, checked, nearest
+from ...config.settings import Settings, Table, Thresholds, checked, nearest
 from ...errors import UsageError
 from ...messages.topic_table import Topics
 from ..runtime import one_line
@@ -80,7 +80,7 @@ def _unknown(node: Node, names: Iterable[str]) -> str:
     # rclpy declares QoS overrides with their topics
     unknown = sorted(name for name in names if not (node.has_parameter(name) or name.startswith("qos_overrides.")))
     known = [row.name for row in TABLE]
-    return "; ".join(f"{name}: {RETIRED.get(name) or f'unknown. The nearest is `{nearest(name, known)}`'}" for name in unknown)
+    return "; ".join(f"{name}: unknown. The nearest is `{nearest(name, known)}`" for name in unknown)
 
 
 def refusal(node: Node, parameters: Iterable[Parameter[Any]]) -> str:

@@ -1,22 +1,10 @@
-"""Rows that arrive one by one: kept in order, forgotten from the front, a window by stamps."""
+"""A window of rows by their stamps."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from boom_twin.diagnostics.model_status import INTERVAL, StampWindow
-from boom_twin.diagnostics.sensor_status import RowBuffer
-
-
-def test_rows_keep_their_order_beyond_any_room() -> None:
-    buffer = RowBuffer(2)
-    for stamp in range(1000):
-        buffer.add(stamp, np.array([stamp, -stamp]))
-        buffer.forget(stamp % 3 == 2)
-    assert buffer.stamps.tolist() == list(range(333, 1000))
-    np.testing.assert_array_equal(buffer.rows, np.outer(buffer.stamps, [1.0, -1.0]))
-    buffer.forget(len(buffer.rows))
-    assert buffer.rows.shape == (0, 2)
 
 
 def test_a_window_holds_its_time_and_begins_anew_if_the_clock_is_set_back() -> None:
