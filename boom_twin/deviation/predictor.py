@@ -29,11 +29,12 @@ from .channels import DRIFT_FIRST, LAG_FIRST, READS_FORCE, READS_MOMENT, TIP_IMU
 from .estimate_row import MODES
 from .kalman import FORCE_ZERO
 from .models import start_models
+from .named_faults import FaultyBoom, NamedFaults
 from .posture import Posture, linearise, new_posture
 from .rest_at_readings import RestFinder
 from .sensor_model import mounting_of
 from .states import DOUBTS, ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
-from .tip_estimate import add_scene_error
+from .tip_estimate import write_scene_error
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 GAUGE_DRIFT = 0.03  # share of the moment in a root second, by which the zero of a strain gauge drifts
@@ -134,6 +135,7 @@ class BoomPredictor:
         noise = SensorNoise(settings.variance(SENSORS[reads.stream]), settings.scene_error, *loads)
         self.filters = new_filters(n, MODES, measured, noise)
         self.finder = RestFinder(scene, self.plan, self.posture, reads)
+        self._faults = NamedFaults(self.posture, reads)
         tables, boom = self.plan.tables, (self._anchor, self.live, self._work)
         self.compiled = CompiledBoom(tables, *boom, self.posture, self.filters, self._bending, self._row)
 
@@ -257,6 +259,10 @@ class BoomPredictor:
         f.settled[:] = angles | strokes
         f.apart[f.settled] = 0.0
 
+    def allow_for(self, faults: Sequence[FaultyBoom]) -> None:
+        """State the deviation of the tip by these faults, which neither prediction nor estimate contain."""
+        self._faults.write_covariance(faults, self.filters.fault)
+
     def doubt(self, channels: Collection[str]) -> None:
         """Allow a large drift of the zeros of these sensors alone: angles, forces, axes of the IMU."""
         self.filters.drift[:] = 1.0
@@ -349,7 +355,7 @@ class BoomPredictor:
         rows[:, drive : drive + n] = columns[:, 2 : 2 + n]
         spread = self.filters.spread[PREDICTION, : rows.shape[1], : rows.shape[1]]
         by_scene = np.zeros(6)  # upper triangle for x, y and angle
-        add_scene_error(self.posture, self.filters, self.live, 0, by_scene)
+        write_scene_error(self.posture, self.filters, self.live, by_scene)
         return np.asarray(np.sqrt(np.einsum("ai,ij,aj->a", rows, spread, rows) + by_scene[[0, 3]]))
 
     # -- what a prediction has

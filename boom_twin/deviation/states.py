@@ -71,6 +71,7 @@ class Filters(NamedTuple):
     innovations : (n, 2) newest lengths less what the prediction's mixture expected before them (m), and their variances.
     Where angles drive the model, length2, before, strokes and innovations are of angles, in rad.
     driving, offsets : (n, s), (n,) rows of what drives the model, and its readings at a state of zeros.
+    fault : (6,) variances of the tip by named faults, see `tip_estimate.write_scene_error`.
     pulls : (n,) predicted forces, N. evidence : (1,) logarithm of the likelihood of all that was read, up to a constant.
     The others are scratch.
     """
@@ -111,6 +112,7 @@ class Filters(NamedTuple):
     transition: Array
     variances: Array
     felt: Array
+    fault: Array
     pulls: Array
     evidence: Array
     turned: Array
@@ -145,7 +147,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         late=np.zeros(len(Stream)), taken=np.zeros(len(Stream), np.int64), curves=np.zeros((channels, 3)),
         copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         modal=np.zeros((modes, 6)), transition=vectors(own, whole(own)), turned=vectors(own, whole(own)),
-        variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
+        variances=np.zeros(states), felt=np.zeros(channels), fault=np.zeros(6), pulls=np.zeros(n), evidence=np.zeros(1),
         row=vectors(states), gain=vectors(states), gains=vectors(4, 4, states), driving=vectors(n, states), offsets=np.zeros(n),
         rows=vectors(9, states), likely=np.zeros(6),
         switch=np.zeros((3, 3)), shares=np.zeros((3, 3)), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),

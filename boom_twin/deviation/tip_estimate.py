@@ -90,8 +90,7 @@ def add_scene_doubt(p, f, live, out):
     A point on the last section shows the errors of the sections before. What it is off by is its zero or the tip's error.
     """
     n, measured, zero = p.drives.shape[0], f.rows[0], zero_place(p)
-    clear(measured, 6)
-    add_scene_error(p, f, live, 0, measured)
+    write_scene_error(p, f, live, measured)
     for c in range(p.channels.shape[0] - 1):
         channel, at = p.channels[c], zero + p.channels[c].zero
         is_first = channel.kind == READS_COORDINATE and channel.index == 0 and p.behind[0] > channel.zero + 1
@@ -110,6 +109,14 @@ def add_scene_doubt(p, f, live, out):
 
 
 @kernel
+def write_scene_error(p, f, live, out):
+    """Write the upper triangle of the tip's covariance by errors of the scene, and by named faults that it does not have."""
+    for i in range(6):
+        out[i] = f.fault[i]
+    add_scene_error(p, f, live, 0, out)
+
+
+@inner
 def add_scene_error(p, f, live, first, out):
     """Add the variance by wrong stiffnesses and masses of the sections from `first` on to an upper triangle.
 
