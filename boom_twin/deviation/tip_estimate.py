@@ -22,7 +22,7 @@ from .estimate_row import (
 )
 from .kalman import ANGLE_ZERO
 from .mixture import renew_estimate
-from .rows import acceleration_row, clear, column_row, difference, rate_row, read, spread_of
+from .rows import acceleration_row, clear, column_row, difference, rate_row, read, spread_of, variance_of
 from .states import ESTIMATE, PREDICTION, force_place, zero_place
 
 MASS_PART = 0.77  # variance of the tip by errors of the masses over that of EI: a cantilever of four equal sections
@@ -61,14 +61,19 @@ def write_tip_estimate(p, f, live, results, out):
 def add_doubt(p, f, out):
     """Add the variance by stroke transducers that are off to the upper triangle of the tip's covariance.
 
-    An angle sensor and the lengths differ because the angle's zero is off by ANGLE_ZERO, or either sensor by FAULT (rad,
-    normal, equal odds). The posterior probability that it is the transducer weighs the square of the tip's way by it.
+    An angle sensor and the lengths differ because the angle's zero is off by ANGLE_ZERO and the prediction by its deviation, or
+    because either sensor is off by FAULT (rad, normal, equal odds). The posterior probability that it is the transducer weighs
+    the square of the tip's way by it.
     """
     n = p.drives.shape[0]
     for i in range(n):
         apart = f.apart[i] - (f.apart[i - 1] if i > 0 and p.absolute[i] else 0.0)
+        if apart == 0.0:
+            continue
+        column_row(p, p.readings, i, 1.0, f.row)
+        usual2 = ANGLE_ZERO * ANGLE_ZERO + variance_of(f.row, f.spread[PREDICTION], f.gain, zero_place(p))
         fault = FAULT_CHANCE / FAULT * math.exp(-0.5 * (apart / FAULT) ** 2)
-        usual = math.exp(-0.5 * (apart / ANGLE_ZERO) ** 2) / ANGLE_ZERO
+        usual = math.exp(-0.5 * apart * apart / usual2) / math.sqrt(usual2)
         share = fault / (usual + 2.0 * fault) * (apart / p.slope[i]) ** 2
         add_square(out, share, p.readings[2 + i, n : n + 3])
 
