@@ -42,11 +42,11 @@ def write_tip_estimate(p, f, live, results, out):
         out[TIP + a] = results.tip[0, a] + difference(f.rows[a], mean, expected, size)
         out[VELOCITY + a] = results.tip[1, a] + difference(f.rows[3 + a], mean, expected, size)
         out[ACCELERATION + a] = results.tip[2, a] + difference(f.rows[6 + a], mean, expected, size)
-    write_covariance(f, 0, size, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
+    write_covariance(f, ESTIMATE, 0, size, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     add_doubt(p, f, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     add_scene_doubt(p, f, live, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
-    write_covariance(f, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
-    write_covariance(f, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
+    write_covariance(f, ESTIMATE, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
+    write_covariance(f, ESTIMATE, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
     for j in range(MODES):
         out[COORDINATES + j] = f.mean[ESTIMATE, j] if j < m else math.nan
         out[RATES + j] = f.mean[ESTIMATE, m + j] if j < m else math.nan
@@ -95,7 +95,8 @@ def add_scene_doubt(p, f, live, out):
     A point on the last section shows the errors of the sections before. What it is off by is its zero or the tip's error.
     """
     n, measured, zero = p.drives.shape[0], f.rows[0], zero_place(p)
-    write_scene_error(p, f, live, measured)
+    clear(measured, 6)
+    add_scene_error(p, f, live, measured)
     for c in range(p.channels.shape[0] - 1):
         channel, at = p.channels[c], zero + p.channels[c].zero
         is_first = channel.kind == READS_COORDINATE and channel.index == 0 and p.behind[0] > channel.zero + 1
@@ -105,7 +106,7 @@ def add_scene_doubt(p, f, live, out):
             left[0] = x * x + f.spread[ESTIMATE, at, at]
             left[1] = x * y + f.spread[ESTIMATE, at, at + 1]
             left[3] = y * y + f.spread[ESTIMATE, at + 1, at + 1]
-            add_scene_error(p, f, live, n if channel.site == 0 else n - 1, left)
+            add_section_errors(p, f, live, n if channel.site == 0 else n - 1, left)
             if left[0] + left[3] < measured[0] + measured[3]:
                 for i in range(6):
                     measured[i] = left[i]
@@ -114,15 +115,24 @@ def add_scene_doubt(p, f, live, out):
 
 
 @kernel
-def write_scene_error(p, f, live, out):
-    """Write the upper triangle of the tip's covariance by errors of the scene, and by named faults that it does not have."""
-    for i in range(6):
-        out[i] = f.fault[i]
-    add_scene_error(p, f, live, 0, out)
+def write_predicted_covariance(p, f, live, out):
+    """Write the upper triangle of the covariance of the predicted tip, with errors of the scene."""
+    for a in range(3):
+        column_row(p, p.readings, p.drives.shape[0] + a, 1.0, f.rows[a])
+    write_covariance(f, PREDICTION, 0, zero_place(p), out)
+    add_scene_error(p, f, live, out)
 
 
 @inner
-def add_scene_error(p, f, live, first, out):
+def add_scene_error(p, f, live, out):
+    """Add the covariance of the tip by errors of the scene, and by named faults that it does not have."""
+    add_section_errors(p, f, live, 0, out)
+    for i in range(6):
+        out[i] += f.fault[i]
+
+
+@inner
+def add_section_errors(p, f, live, first, out):
     """Add the variance by wrong stiffnesses and masses of the sections from `first` on to an upper triangle.
 
     The bending of section i moves the tip by c_i = (d_i + a_i e_z x r_i, a_i), with the deflection d_i and the turn a_i of its
@@ -141,11 +151,11 @@ def add_scene_error(p, f, live, first, out):
 
 
 @inner
-def write_covariance(f, first, size, out):
-    """Write the upper triangle of the estimate's covariance of what three of `f.rows` read."""
+def write_covariance(f, mixture, first, size, out):
+    """Write the upper triangle of the covariance of what three of `f.rows` read by a mixture."""
     at = 0
     for a in range(first, first + 3):
-        spread_of(f.rows[a], f.spread[ESTIMATE], f.gain, size)
+        spread_of(f.rows[a], f.spread[mixture], f.gain, size)
         for b in range(a, first + 3):
             out[at] = read(f.rows[b], f.gain, size)
             at += 1
