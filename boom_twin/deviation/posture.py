@@ -44,70 +44,56 @@ CURVATURE_STEP = 1e-4  # rad
 
 @by_reference
 class Posture(NamedTuple):
-    """Boom at rest and its first-order changes; n joints, m modes, u unknowns, h histories, c = 2 + n + m columns.
+    """Boom at rest and its first-order changes.
 
-    Columns: force at the tip along x and y (the part that no mode has), the drives, the modes.
-
-    modes : (1,) how many. drives : (n,) strokes of the drives at rest, m. angles : (n,) of the rigid boom there, rad.
-    rest : (u,) unknowns at rest. columns : (c, u) their changes. motions : (m, h) of every mass point.
-    readings : (c, 2 n + 3 sites) changes of what angle sensors read (rad), of x, y, angle of every site of
-    `boom_twin.deviation.channels`, the tip first, and of the angles of the sections' chords, from pivot to pivot.
-    forces : (c, n) of the cylinders, N. moments : (c, stations) of bending, N m.
-    read, pulled : (2 n + 3 sites,), (n,) angles to forces at rest.
-    omega, decay : (m,) rad/s and 2 zeta omega, 1/s. compliance, lag : (n,) 1/k (m/N; 0 if rigid) and d/k (s).
-    oil_read : (n,) the compliance where stroke transducers read lengths, 0 where they read drives (`reads_drive`).
-    drive_read : (n,) change of such a reading by its drive at a constant force N, m/m: 1 + N d(1/k)/dd, for a longer column of
-    oil is softer; 1 where drives are read.
-    reads_angle : whether the model is driven by angles. tilt : (n,) angle of the base, for inclinometers. gravity : (2,) m/s^2.
-    slope, curvature : (n,) change of a joint's angle by its stroke, rad/m, and of that, rad/m^2.
-    frames, absolute, sways : (n,) of angle sensors, see `Mounting`. roots : (n + 1,)
-    frames of the pivots and of the tip. masses : (h,) kg, kg m^2. points : (k, 2) mass points: place of x in h (y follows),
-    section. lengths : (n,) of the sections, m. closed : (n,) m.
-    channels, sites, errors, psi, weights, bending : see `boom_twin.deviation.channels.Measurement`.
-    behind : (1,) states of sensors' errors that the estimate has beside those of the prediction. delayed : (1,) copies of late
-    readings behind these, see `boom_twin.deviation.delayed`.
-    The other fields are scratch; `rate` (n,) stays zero.
+    n joints, m modes, u unknowns, h histories, c = 2 + n + m columns: force at the tip along x and y (the part that no mode
+    has), the drives, the modes.
     """
 
-    modes: NDArray[np.int64]
-    drives: Array
-    angles: Array
-    rest: Array
-    columns: Array
-    motions: Array
+    modes: NDArray[np.int64]  # (1,) how many
+    drives: Array  # (n,) strokes of the drives at rest, m
+    angles: Array  # (n,) of the rigid boom there, rad
+    rest: Array  # (u,) unknowns at rest
+    columns: Array  # (c, u) their changes
+    motions: Array  # (m, h) of every mass point
+    # (c, 2 n + 3 sites) changes of what angle sensors read (rad), of x, y, angle of every site, the tip first, and of the
+    # angles of the sections' chords, from pivot to pivot
     readings: Array
-    forces: Array
-    moments: Array
-    read: Array
-    pulled: Array
-    omega: Array
-    decay: Array
-    compliance: Array
-    lag: Array
-    oil_read: Array
+    forces: Array  # (c, n) of the cylinders, N
+    moments: Array  # (c, stations) of bending, N m
+    read: Array  # (2 n + 3 sites,) what `readings` are changes of, at rest
+    pulled: Array  # (n,) forces at rest, N
+    omega: Array  # (m,) natural frequencies, rad/s
+    decay: Array  # (m,) 2 zeta omega, 1/s
+    compliance: Array  # (n,) 1/k, m/N; 0 if rigid
+    lag: Array  # (n,) d/k, s
+    oil_read: Array  # (n,) the compliance where stroke transducers read lengths, 0 where they read drives (`reads_drive`)
+    # (n,) change of such a reading by its drive at a constant force N, m/m: 1 + N d(1/k)/dd, for a longer column of oil is
+    # softer; 1 where drives are read
     drive_read: Array
     reads_drive: bool
-    reads_angle: bool
-    tilt: Array
-    gravity: Array
-    slope: Array
-    curvature: Array
-    frames: NDArray[np.int64]
+    reads_angle: bool  # whether the model is driven by angles
+    tilt: Array  # (n,) angle of the base, for inclinometers, rad
+    gravity: Array  # (2,) m/s^2
+    slope: Array  # (n,) change of a joint's angle by its stroke, rad/m
+    curvature: Array  # (n,) change of that, rad/m^2
+    frames: NDArray[np.int64]  # (n,) of angle sensors, as the next two, see `Mounting`
     absolute: NDArray[np.bool_]
     sways: NDArray[np.bool_]
-    roots: NDArray[np.int64]
-    masses: Array
-    points: NDArray[np.int64]
-    lengths: Array
-    closed: Array
-    channels: np.recarray
+    roots: NDArray[np.int64]  # (n + 1,) frames of the pivots and of the tip
+    masses: Array  # (h,) kg, kg m^2
+    points: NDArray[np.int64]  # (k, 2) mass points: place of x in h (y follows), section
+    lengths: Array  # (n,) of the sections, m
+    closed: Array  # (n,) closed lengths of the cylinders, m
+    channels: np.recarray  # as the next five, see `boom_twin.deviation.channels.Measurement`
     sites: np.recarray
     errors: np.recarray
     psi: Array
     weights: Array
     bending: Array
-    behind: NDArray[np.int64]
-    delayed: NDArray[np.int64]
+    behind: NDArray[np.int64]  # (1,) states of sensors' errors that the estimate has beside those of the prediction
+    delayed: NDArray[np.int64]  # (1,) copies of late readings behind these, see `boom_twin.deviation.delayed`
+    # scratch; `rate` (n,) stays zero
     still: Array
     position: Array
     hat: Array

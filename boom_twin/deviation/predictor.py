@@ -20,28 +20,29 @@ from ..errors import SolverError, UsageError
 from ..kernels.jit import hold
 from ..kernels.result_row import places_in, prediction_width
 from ..kernels.tables import OK, SENTENCES, State, Tables, Work
-from ..predictions import Clock, Outline
+from ..predictions import Outline
 from ..scene.kinematics import RigidJoints
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading, channels_of, streams_of
-from .channels import DRIFT_FIRST, LAG_FIRST, READS_FORCE, READS_MOMENT, TIP_IMU_STATES, measurement_of
+from .channels import READS_MOMENT, TIP_IMU_STATES, measurement_of
 from .estimate_row import MODES
 from .kalman import FORCE_ZERO
 from .models import start_models
+from .named_faults import FaultyBoom, NamedFaults
 from .posture import Posture, linearise, new_posture
 from .rest_at_readings import RestFinder
+from .sensor_errors import LAG_FLOOR as LAG_FLOOR
+from .sensor_errors import SensorErrors
 from .sensor_model import mounting_of
-from .states import DOUBTS, ESTIMATE, FED, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
-from .tip_estimate import add_scene_error
+from .states import DOUBTS, FED, PREDICTION, Filters, SensorNoise, drive_place, new_filters
+from .tip_estimate import write_predicted_covariance
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 GAUGE_DRIFT = 0.03  # share of the moment in a root second, by which the zero of a strain gauge drifts
 WIDTH = 1e-6  # relative accuracy of natural frequencies
 USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 2.5e-3, 1e-4, 2e-3, 2e-2  # shares of the boom's weight, see `SensorNoise`
-DOUBTED_DRIFT = 1000.0  # times the usual variance of the drift of a zero, of a sensor in doubt
 FAILED_WAY, FAILED_RATE = 0.05, 0.02  # m, m/s: how far a drive is, and how fast, when its transducer is found to fail
-LAG_FLOOR = 2e-3  # s, error of an estimated lag by errors of the model: measured on sessions of the virtual rig
 SWING, SPEED = 0.3, 0.05  # how far a boom at work swings, as a share of the tip's deflection; m/s of its cylinders
 
 
@@ -100,6 +101,7 @@ class BoomPredictor:
     posture : Posture
     filters : Filters
     finder : RestFinder
+    sensors : SensorErrors
     channels : dict of Stream to tuple of str
         Channels of every stream; none of those that the boom does not have.
     compiled : CompiledBoom
@@ -134,6 +136,8 @@ class BoomPredictor:
         noise = SensorNoise(settings.variance(SENSORS[reads.stream]), settings.scene_error, *loads)
         self.filters = new_filters(n, MODES, measured, noise)
         self.finder = RestFinder(scene, self.plan, self.posture, reads)
+        self.sensors = SensorErrors(self.posture, self.filters, self.channels)
+        self._faults = NamedFaults(self.posture, reads)
         tables, boom = self.plan.tables, (self._anchor, self.live, self._work)
         self.compiled = CompiledBoom(tables, *boom, self.posture, self.filters, self._bending, self._row)
 
@@ -243,47 +247,9 @@ class BoomPredictor:
         f.settled[:] = angles | strokes
         f.apart[f.settled] = 0.0
 
-    def doubt(self, channels: Collection[str]) -> None:
-        """Allow a large drift of the zeros of these sensors alone: angles, forces, axes of the IMU."""
-        self.filters.drift[:] = 1.0
-        self.filters.drift[self._zeros_of(channels)] = DOUBTED_DRIFT
-
-    def zeros(self, channels: Collection[str]) -> tuple[Array, Array, Array]:
-        """Return the estimated zeros of these sensors, in their units, their variances, and deviations by errors of the scene.
-
-        They are in the order of the states. The variances are at given mount and scale of the tip IMU, which do not change.
-        Errors of the scene look like a zero of a force: as a share of the force, which is the same at all times.
-        """
-        f, first, places = self.filters, zero_place(self.posture), self._zeros_of(channels)
-        covariance, at, fixed = f.spread[ESTIMATE], first + np.array(places), first + np.array([2, 3])
-        shared = covariance[np.ix_(at, fixed)]
-        variances = covariance[at, at] - (shared @ np.linalg.pinv(covariance[np.ix_(fixed, fixed)]) * shared).sum(axis=1)
-        errors = np.zeros(len(places))
-        for row in self.posture.channels:
-            if row.kind == READS_FORCE and row.zero in places:
-                errors[places.index(row.zero)] = f.noise.scene_error * f.pulls[row.index]
-        return f.mean[ESTIMATE, at], variances, errors
-
-    @property
-    def clocks(self) -> dict[Stream, Clock]:
-        """Lags and drifts of the lagging streams, as estimated."""
-        f, found, zero, streams = self.filters, dict[Stream, Clock](), zero_place(self.posture), tuple(Stream)
-        for row in self.posture.channels[self.posture.channels.lag >= 0]:
-            lag, is_there = zero + int(row.lag), self.posture.behind[0] > row.lag and f.status[FED] == 1
-            sigmas = np.sqrt(f.spread[ESTIMATE].diagonal()[lag : lag + 2]) if is_there else (LAG_FIRST, DRIFT_FIRST)
-            numbers = (
-                f.lags[row.stream] + f.mean[ESTIMATE, lag],
-                math.hypot(sigmas[0], LAG_FLOOR),
-                f.mean[ESTIMATE, lag + 1],
-                sigmas[1],
-            )
-            found.setdefault(streams[row.stream], Clock(*map(float, numbers)))
-        return {stream: clock for stream, clock in found.items() if not SENSORS[stream].beside}
-
-    def _zeros_of(self, channels: Collection[str]) -> list[int]:
-        """Return the places of the zeros of these sensors among those of all."""
-        names = [name for stream, names in self.channels.items() if stream is not Stream.STROKES for name in names]
-        return sorted(int(row.zero) for name, row in zip(names, self.posture.channels, strict=True) if name in channels)
+    def allow_for(self, faults: Sequence[FaultyBoom]) -> None:
+        """State the deviation of the tip by these faults, which neither prediction nor estimate contain."""
+        self._faults.write_covariance(faults, self.filters.fault)
 
     def add_phase(self) -> None:
         """Add the phase uncertainty of the vibration at the newest sample after a pause of unknown length.
@@ -321,17 +287,9 @@ class BoomPredictor:
     @property
     def tip_sigmas(self) -> Array:
         """Standard deviations of the predicted tip along x and y, m, shape (2,)."""
-        n, m = self.plan.joints, int(self.posture.modes[0])
-        drive = drive_place(self.posture)
-        rows = np.zeros((2, drive + 3 * n))
-        columns = self.posture.readings[: 2 + n + m, n : n + 2].T
-        rows[:, :m], rows[:, 2 * m : 2 * m + 2] = columns[:, 2 + n :], columns[:, :2]
-        rows[:, 2 * m + 2 : 2 * m + 4] = columns[:, :2]
-        rows[:, drive : drive + n] = columns[:, 2 : 2 + n]
-        spread = self.filters.spread[PREDICTION, : rows.shape[1], : rows.shape[1]]
-        by_scene = np.zeros(6)  # upper triangle for x, y and angle
-        add_scene_error(self.posture, self.filters, self.live, 0, by_scene)
-        return np.asarray(np.sqrt(np.einsum("ai,ij,aj->a", rows, spread, rows) + by_scene[[0, 3]]))
+        covariance = np.zeros(6)  # upper triangle for x, y and angle
+        write_predicted_covariance(self.posture, self.filters, self.live, covariance)
+        return np.asarray(np.sqrt(covariance[[0, 3]]))
 
     # -- what a prediction has
 

@@ -12,7 +12,7 @@ from ..analysis.equilibrium import settle
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import UsageError
-from ..kernels.tables import FRAME_ANGLE, State
+from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, State
 from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes, strokes_of_angles
 from ..scene.schema import Scene
@@ -69,6 +69,12 @@ class RestFinder:
             settle(self._struts, held, self._struts.work(), lengths, angles)
         forces = taken_apart(self._struts, first_row(self._struts, held)).cylinder_forces
         return Rest(spring_free(self._plan, lengths, forces), angles, readings)
+
+    def tip_at(self, readings: Array) -> Array:
+        """Return x, y (m) and angle (rad) of the tip at rest where what drives the model reads `readings`; see `rest_at`."""
+        rest, boom = self.rest_at(readings), self._plan.state()
+        settle(self._plan, boom, self._plan.work(), rest.drives, rest.angles)
+        return boom.frames[-1, [FRAME_X, FRAME_Y, FRAME_ANGLE]]
 
     def readings_at(self, lengths: Array) -> Array:
         """Return what drives the model reads at rest with cylinder `lengths` (m), shape (n,)."""

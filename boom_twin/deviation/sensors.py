@@ -23,7 +23,8 @@ from .states import ALL_BURST, ALL_VALVES, ESTIMATE, FED, FED_STAMP, IS_OLD, PRE
 
 INEXACT = 0.03  # error of the model: share of accelerations and rates of turn at a site (rms), of forces beside those at rest
 LEARN_NOISE = 0.02  # weight of one reading in the learnt noise of its channel
-LEARN_RATIO = 0.005  # weight of one reading in means of its channel: square of normalised innovations, residuals of angles
+LEARN_RATIO = 0.005  # weight of one reading in the mean square of its channel's normalised innovations
+APART_TIME = 0.1  # s, over which residuals of angles are averaged
 DOF = 4.0  # degrees of freedom of Student's t, the distribution of innovations of the estimate
 SLOW = 5_000_000_000  # ns for which the position of a point keeps the estimate, beyond other readings
 OLDEST = 0.1  # s, most that a reading may be late
@@ -45,14 +46,14 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
     stamp, newest : int
         Stamps of the sample, and of the newest lengths, ns.
     """
-    age = (newest - stamp) * 1e-9  # s
+    age, share = (newest - stamp) * 1e-9, min(max(stamp - f.taken[stream], 0) * 1e-9 / APART_TIME, 1.0)  # s, 1
     last, errors, lag = first, 0, p.channels[first].lag
     while last < p.channels.shape[0] and p.channels[last].stream == stream:
         residual, channel = residuals[last - first], p.channels[last]
         if math.isfinite(residual) and not f.masked[last]:
             errors = max(errors, channel.last + 1, lag + 2)
         if math.isfinite(residual) and channel.kind == READS_ANGLE and not f.settled[channel.index]:
-            f.apart[channel.index] += LEARN_RATIO * (residual - f.apart[channel.index])
+            f.apart[channel.index] += share * (residual - f.apart[channel.index])
         last += 1
     if errors == 0 or age > OLDEST:
         return

@@ -39,94 +39,70 @@ class SensorNoise(NamedTuple):
 
 @by_reference
 class Filters(NamedTuple):
-    """Filters of one boom; n cylinders, m modes at most, s states, p of them of the prediction (zeros behind).
+    """Filters of one boom.
 
-    x, p : (6, s), (6, s, s) states and covariances of the models. chances : (6,) of them, in each mixture one in all.
-    mean, spread : (2, s), (2, s, s) of the mixtures. load2 : (2, 2) variances of the fast load, N^2, of prediction and
-    estimate, along x and y.
-    jerk : (n,) m^2/s^5. is_open, still : (2, n) 1 where a valve is believed open, s since its drive began to stand still.
-    status : (4,) whether the estimate has readings of its own, stamp of the newest of these, doubts by the prediction, whether
-    its covariance in `spread` is older than its models.
-    masked, deaf : (c,), (n,) measured channels that the estimate, and strokes that no model is to use. noise : variances.
-    excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
-    drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
-    m^2. before, interval : (n, 3), (2,) the three lengths before (m); times between the newest two, and of `weights`, s.
-    apart : (n,) recent mean of what angle sensors read more than the lengths make of them, rad; 0 where `settled`, the (n,)
-    joints of which the stroke or the angle is known to be wrong.
-    lags, late : (streams,) by which stamps are late, as estimated, and by which samples arrived after their stamps at most, s.
-    copies : (c,) places of late channels among the copies of one instant, -1 of others. instants : (DELAYED,) stamps of copies,
-    see `delayed`. taken : (streams,) stamps of the newest samples that corrected the estimate, ns. curves : (c, 3) expected
-    readings, their rates, and mean squares of their second derivatives.
-    bends : (sites, 2) accelerations that sites have by their curved ways, m/s^2. ways : (n + 1, 7) those of pivots and tip (2),
-    rates (rad/s), angular accelerations by linkages, and about rest (rad/s^2) of the chords behind them, accelerations that
-    pivots and tip have by these off their places at rest (2). swing : (m,) modal forces by these. inputs : (2 m,) changes of
-    modal coordinates and rates in a step by them. sway2 : (n,) square of the largest angle by which an inclinometer lately
-    erred, rad^2.
-    modal, transition : (m, 6), (p, p) part of the modes in the transition matrix, and its transpose. variances : (s,) of its
-    noise.
-    motion : (sites, 9) predicted x, y, angle of every site, m and rad, their rates, their accelerations.
-    shaking : (sites, 2) mean squares of its acceleration, m^2/s^4, and of its rate of turn, rad^2/s^2. felt : (c,) specific
-    force that channels of accelerometers read by that, m/s^2.
-    strokes : (n, 3) predicted lengths (m), their rates and accelerations.
-    innovations : (n, 2) newest lengths less what the prediction's mixture expected before them (m), and their variances.
-    Where angles drive the model, length2, before, strokes and innovations are of angles, in rad.
-    driving, offsets : (n, s), (n,) rows of what drives the model, and its readings at a state of zeros.
-    pulls : (n,) predicted forces, N. evidence : (1,) logarithm of the likelihood of all that was read, up to a constant.
-    The others are scratch.
+    n cylinders, m modes at most, c measured channels, z errors of sensors, s states of the estimate, p of them of the
+    prediction (zeros behind). What drives the model, below "length", is an angle (rad) where angles drive it.
     """
 
-    x: Array
-    p: Array
-    chances: Array
-    mean: Array
-    spread: Array
-    load2: Array
-    jerk: Array
-    is_open: NDArray[np.int64]
-    still: Array
+    x: Array  # (6, s) states of the models
+    p: Array  # (6, s, s) their covariances
+    chances: Array  # (6,) their probabilities, in each mixture one in all
+    mean: Array  # (2, s) of the mixtures
+    spread: Array  # (2, s, s) covariances of these
+    load2: Array  # (2, 2) variances of the fast load, of prediction and estimate, along x and y, N^2
+    jerk: Array  # (n,) density of the jerk of drives, m^2/s^5
+    is_open: NDArray[np.int64]  # (2, n) 1 where a valve is believed open
+    still: Array  # (2, n) time since its drive began to stand still, s
+    # (4,) whether the estimate has readings of its own, stamp of the newest of these, doubts by the prediction, whether its
+    # covariance in `spread` is older than its models
     status: NDArray[np.int64]
-    masked: NDArray[np.bool_]
-    deaf: NDArray[np.bool_]
-    excess: Array
-    ratio: Array
-    drift: Array
-    length2: Array
-    before: Array
-    interval: Array
-    bends: Array
+    masked: NDArray[np.bool_]  # (c,) channels that the estimate is not to use
+    deaf: NDArray[np.bool_]  # (n,) lengths that no model is to use
+    excess: Array  # (c,) variance that a channel shows over the stated one, at least 1
+    ratio: Array  # (c,) mean square of normalised innovations
+    drift: Array  # (z,) variance of the random walk over the usual one
+    length2: Array  # (n,) variances of lengths as learnt, m^2
+    before: Array  # (n, 3) the three lengths before, m
+    interval: Array  # (2,) time between the newest two lengths, and that of `transition`, s
+    bends: Array  # (sites, 2) accelerations of sites by their curved ways, m/s^2
+    # (n + 1, 7) of pivots and tip: that acceleration (2); of the chords behind them: rate (rad/s), angular accelerations by
+    # linkages and about rest (rad/s^2); acceleration that pivots and tip have by these off their places at rest (2)
     ways: Array
-    swing: Array
-    inputs: Array
-    sway2: Array
-    apart: Array
-    settled: NDArray[np.bool_]
-    lags: Array
-    late: Array
-    taken: NDArray[np.int64]
-    curves: Array
-    copies: NDArray[np.int64]
-    instants: NDArray[np.int64]
+    swing: Array  # (m,) modal forces by the accelerations of curved ways
+    inputs: Array  # (2 m,) changes of modal coordinates and rates in a step by these
+    sway2: Array  # (n,) square of the largest angle by which an inclinometer lately erred, rad^2
+    apart: Array  # (n,) recent mean of what angle sensors read more than the lengths make of them, rad; 0 where `settled`
+    settled: NDArray[np.bool_]  # (n,) joints of which the length or the angle is known to be wrong
+    lags: Array  # (streams,) time by which stamps are late, as estimated, s
+    late: Array  # (streams,) time by which samples arrived after their stamps, at most, s
+    taken: NDArray[np.int64]  # (streams,) stamps of the newest samples that corrected the estimate, ns
+    curves: Array  # (c, 3) expected readings, their rates, and mean squares of their second derivatives
+    copies: NDArray[np.int64]  # (c,) places of late channels among the copies of one instant, -1 of others
+    instants: NDArray[np.int64]  # (DELAYED,) stamps of copies, see `delayed`
     noise: SensorNoise
-    modal: Array
-    transition: Array
-    variances: Array
-    felt: Array
-    pulls: Array
-    evidence: Array
+    modal: Array  # (m, 6) part of the modes in the transition matrix
+    transition: Array  # (p, p) its transpose
+    variances: Array  # (s,) of its noise
+    felt: Array  # (c,) specific force that channels of accelerometers read by `motion`, m/s^2
+    fault: Array  # (6,) variances of the tip by named faults, see `named_faults`
+    pulls: Array  # (n,) predicted forces, N
+    evidence: Array  # (1,) logarithm of the likelihood of all that was read, up to a constant
+    driving: Array  # (n, s) rows of the lengths
+    offsets: Array  # (n,) lengths at a state of zeros
+    shaking: Array  # (sites, 2) mean squares of acceleration, m^2/s^4, and of rate of turn, rad^2/s^2
+    motion: Array  # (sites, 9) predicted x, y, angle (m, rad), their rates, their accelerations
+    strokes: Array  # (n, 3) predicted lengths (m), their rates and accelerations
+    innovations: Array  # (n, 2) newest lengths less what the prediction's mixture expected before them (m); their variances
+    # scratch
     turned: Array
     row: Array
     gain: Array
     gains: Array
-    driving: Array
-    offsets: Array
     rows: Array
     likely: Array
     switch: Array
     shares: Array
-    shaking: Array
-    motion: Array
-    strokes: Array
-    innovations: Array
 
 
 def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoise) -> Filters:
@@ -145,7 +121,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         late=np.zeros(len(Stream)), taken=np.zeros(len(Stream), np.int64), curves=np.zeros((channels, 3)),
         copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         modal=np.zeros((modes, 6)), transition=vectors(own, whole(own)), turned=vectors(own, whole(own)),
-        variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
+        variances=np.zeros(states), felt=np.zeros(channels), fault=np.zeros(6), pulls=np.zeros(n), evidence=np.zeros(1),
         row=vectors(states), gain=vectors(states), gains=vectors(4, 4, states), driving=vectors(n, states), offsets=np.zeros(n),
         rows=vectors(9, states), likely=np.zeros(6),
         switch=np.zeros((3, 3)), shares=np.zeros((3, 3)), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),

@@ -22,7 +22,7 @@ from .estimate_row import (
 )
 from .kalman import ANGLE_ZERO
 from .mixture import renew_estimate
-from .rows import acceleration_row, clear, column_row, difference, rate_row, read, spread_of
+from .rows import acceleration_row, clear, column_row, difference, rate_row, read, spread_of, variance_of
 from .states import ESTIMATE, PREDICTION, force_place, zero_place
 
 MASS_PART = 0.77  # variance of the tip by errors of the masses over that of EI: a cantilever of four equal sections
@@ -42,11 +42,11 @@ def write_tip_estimate(p, f, live, results, out):
         out[TIP + a] = results.tip[0, a] + difference(f.rows[a], mean, expected, size)
         out[VELOCITY + a] = results.tip[1, a] + difference(f.rows[3 + a], mean, expected, size)
         out[ACCELERATION + a] = results.tip[2, a] + difference(f.rows[6 + a], mean, expected, size)
-    write_covariance(f, 0, size, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
+    write_covariance(f, ESTIMATE, 0, size, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     add_doubt(p, f, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     add_scene_doubt(p, f, live, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
-    write_covariance(f, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
-    write_covariance(f, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
+    write_covariance(f, ESTIMATE, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
+    write_covariance(f, ESTIMATE, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
     for j in range(MODES):
         out[COORDINATES + j] = f.mean[ESTIMATE, j] if j < m else math.nan
         out[RATES + j] = f.mean[ESTIMATE, m + j] if j < m else math.nan
@@ -61,14 +61,19 @@ def write_tip_estimate(p, f, live, results, out):
 def add_doubt(p, f, out):
     """Add the variance by stroke transducers that are off to the upper triangle of the tip's covariance.
 
-    An angle sensor and the lengths differ because the angle's zero is off by ANGLE_ZERO, or either sensor by FAULT (rad,
-    normal, equal odds). The posterior probability that it is the transducer weighs the square of the tip's way by it.
+    An angle sensor and the lengths differ because the angle's zero is off by ANGLE_ZERO and the prediction by its deviation, or
+    because either sensor is off by FAULT (rad, normal, equal odds). The posterior probability that it is the transducer weighs
+    the square of the tip's way by it.
     """
     n = p.drives.shape[0]
     for i in range(n):
         apart = f.apart[i] - (f.apart[i - 1] if i > 0 and p.absolute[i] else 0.0)
+        if apart == 0.0:
+            continue
+        column_row(p, p.readings, i, 1.0, f.row)
+        usual2 = ANGLE_ZERO * ANGLE_ZERO + variance_of(f.row, f.spread[PREDICTION], f.gain, zero_place(p))
         fault = FAULT_CHANCE / FAULT * math.exp(-0.5 * (apart / FAULT) ** 2)
-        usual = math.exp(-0.5 * (apart / ANGLE_ZERO) ** 2) / ANGLE_ZERO
+        usual = math.exp(-0.5 * apart * apart / usual2) / math.sqrt(usual2)
         share = fault / (usual + 2.0 * fault) * (apart / p.slope[i]) ** 2
         add_square(out, share, p.readings[2 + i, n : n + 3])
 
@@ -91,7 +96,7 @@ def add_scene_doubt(p, f, live, out):
     """
     n, measured, zero = p.drives.shape[0], f.rows[0], zero_place(p)
     clear(measured, 6)
-    add_scene_error(p, f, live, 0, measured)
+    add_scene_error(p, f, live, measured)
     for c in range(p.channels.shape[0] - 1):
         channel, at = p.channels[c], zero + p.channels[c].zero
         is_first = channel.kind == READS_COORDINATE and channel.index == 0 and p.behind[0] > channel.zero + 1
@@ -101,7 +106,7 @@ def add_scene_doubt(p, f, live, out):
             left[0] = x * x + f.spread[ESTIMATE, at, at]
             left[1] = x * y + f.spread[ESTIMATE, at, at + 1]
             left[3] = y * y + f.spread[ESTIMATE, at + 1, at + 1]
-            add_scene_error(p, f, live, n if channel.site == 0 else n - 1, left)
+            add_section_errors(p, f, live, n if channel.site == 0 else n - 1, left)
             if left[0] + left[3] < measured[0] + measured[3]:
                 for i in range(6):
                     measured[i] = left[i]
@@ -110,7 +115,24 @@ def add_scene_doubt(p, f, live, out):
 
 
 @kernel
-def add_scene_error(p, f, live, first, out):
+def write_predicted_covariance(p, f, live, out):
+    """Write the upper triangle of the covariance of the predicted tip, with errors of the scene."""
+    for a in range(3):
+        column_row(p, p.readings, p.drives.shape[0] + a, 1.0, f.rows[a])
+    write_covariance(f, PREDICTION, 0, zero_place(p), out)
+    add_scene_error(p, f, live, out)
+
+
+@inner
+def add_scene_error(p, f, live, out):
+    """Add the covariance of the tip by errors of the scene, and by named faults that it does not have."""
+    add_section_errors(p, f, live, 0, out)
+    for i in range(6):
+        out[i] += f.fault[i]
+
+
+@inner
+def add_section_errors(p, f, live, first, out):
     """Add the variance by wrong stiffnesses and masses of the sections from `first` on to an upper triangle.
 
     The bending of section i moves the tip by c_i = (d_i + a_i e_z x r_i, a_i), with the deflection d_i and the turn a_i of its
@@ -129,11 +151,11 @@ def add_scene_error(p, f, live, first, out):
 
 
 @inner
-def write_covariance(f, first, size, out):
-    """Write the upper triangle of the estimate's covariance of what three of `f.rows` read."""
+def write_covariance(f, mixture, first, size, out):
+    """Write the upper triangle of the covariance of what three of `f.rows` read by a mixture."""
     at = 0
     for a in range(first, first + 3):
-        spread_of(f.rows[a], f.spread[ESTIMATE], f.gain, size)
+        spread_of(f.rows[a], f.spread[mixture], f.gain, size)
         for b in range(a, first + 3):
             out[at] = read(f.rows[b], f.gain, size)
             at += 1

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.bending_stress import BendingStressModel, stations
-from ..deviation.load_spectrum import TipLoadFinder
+from ..analysis.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms, repeated, values_of
 from ..health.deviations import KIND as DEVIATION
 from ..health.sensor_monitor import noise_as_text

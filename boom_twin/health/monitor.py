@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..config.settings import Settings
+from ..deviation.named_faults import FaultyBoom
+from ..scene.edit import loaded
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, SENSORS, Alarm, Array, Health, Mount, Place, Stream, StrokeReading
 from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows
-from .causes import explains
+from .causes import Fault, explains, hypothesis
 from .deviations import SIGMAS, DeviationMonitor
 from .fault_twins import FaultTwins
 from .lag_monitor import LagMonitor
@@ -65,7 +67,8 @@ class HealthMonitor:
     ) -> None:
         self._reads, self._drive = reads, reads.stream
         self.fault_twins: FaultTwins | None = None
-        self._settings = settings
+        self._scene, self._settings = scene, settings
+        self._told_faults, self._faulty_booms = list[Alarm](), tuple[FaultyBoom, ...]()
         self._channels = {stream: names for stream, names in channels.items() if names}
         self._ranges = sensor_ranges(scene, mounts)
         self._uncertain = UNCERTAIN * settings.variance(SENSORS[self._drive])
@@ -156,6 +159,21 @@ class HealthMonitor:
     def _named(self) -> list[Alarm]:
         """Alarms of named causes that last."""
         return [] if self.fault_twins is None else self.fault_twins.alarms
+
+    @property
+    def faulty_booms(self) -> Sequence[FaultyBoom]:
+        """Boom with each named fault of stiffnesses and loads; the same object until other faults are named."""
+        if (named := self._named) != self._told_faults:
+            self._told_faults, self._faulty_booms = named, tuple(self._booms_with(named))
+        return self._faulty_booms
+
+    def _booms_with(self, named: Iterable[Alarm]) -> Iterator[FaultyBoom]:
+        for alarm in named:
+            for kind, size, sigma, _ in (part for rank in alarm.ranked[:1] for part in rank.parts):
+                if kind in ("softer", "more", "less"):
+                    each = hypothesis(self._scene, [Fault(str(alarm.cause), kind, size)])
+                    load = each.load(payload=-1.0, line_fill=-1.0)
+                    yield FaultyBoom(loaded(each.scene, **load), sigma / size)
 
     def _lasting(self) -> Iterable[Alarm]:
         """Yield all alarms that last."""

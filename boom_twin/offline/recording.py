@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.load_spectrum import TipLoad, TipLoadFinder
 from ..analysis.sample_series import ColumnStatistics
 from ..config.settings import Settings
-from ..deviation.load_spectrum import TipLoad, TipLoadFinder
 from ..health.alarms import Alarms, evidence_with_cause
 from ..predictions import Clock
 from ..system.received_files import sha256_of

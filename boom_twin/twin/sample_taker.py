@@ -119,7 +119,7 @@ class SampleTaker:
     def doubt(self, channels: Collection[str]) -> None:
         """Let the zeros of these sensors drift by any amount, and those of all others as they do."""
         self._doubted = frozenset(channels)
-        self._boom.doubt(self._doubted)
+        self._boom.sensors.doubt(self._doubted)
 
     def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
         self._boom.leave_out(masked, strokes, np.zeros_like(strokes))
@@ -134,7 +134,7 @@ class SampleTaker:
         """Make the parts of the model that depend on the load."""
         settings, scene = self.settings, loaded(self.scene, *self.settings.load)
         boom = BoomPredictor(scene, settings, self.mounts, self.reads, self.places, self.lagging)
-        boom.doubt(self._doubted)
+        boom.sensors.doubt(self._doubted)
         judge: HealthMonitor | None = None
         if self._health:
             judge = HealthMonitor(scene, settings, self.mounts, self.absent, boom.channels, self.reads, self.places)

@@ -100,7 +100,7 @@ class Twin(SampleTaker):
     @property
     def clocks(self) -> dict[Stream, Clock]:
         """Lag and drift of every lagging stream, as estimated by now."""
-        return self._boom.clocks
+        return self._boom.sensors.clocks
 
     def rezero(self, sensor: str) -> dict[str, float]:
         """Request the mean residual of the last second as the zero of a sensor; return its new zeros by channel.
@@ -151,7 +151,7 @@ class Twin(SampleTaker):
         values, variances, errors : ndarray, shape (channels,)
             m/s^2, rad, N, their squares, and standard deviations of what errors of the scene make of forces.
         """
-        return self._boom.zeros(channels)
+        return self._boom.sensors.zeros(channels)
 
     def warm_up(self) -> None:
         """Compile every kernel, with a temporary twin of the same boom."""

@@ -212,6 +212,6 @@ def test_a_zero_is_known_beside_the_mount_and_as_well_as_the_scene() -> None:
     ]
     covariance[first + 5 + N, first + 5 + N] = 1e6  # of the second force, behind as many angles
     boom.filters.pulls[1] = 1e5
-    _, variances, errors = boom.zeros(["tip_imu_x", "tip_imu_z", "cylinder_force_2"])
+    _, variances, errors = boom.sensors.zeros(["tip_imu_x", "tip_imu_z", "cylinder_force_2"])
     assert variances == pytest.approx([0.3 - 0.2**2 / 0.4, 0.5 - 0.1**2 / 0.2, 1e6])
     assert errors == pytest.approx([0.0, 0.0, 2e3])

@@ -19,8 +19,8 @@ from math import hypot, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.sample_series import BREAK
 from ..types import NANO, Array
+from .sample_series import BREAK
 
 BIN = 0.05  # s
 WINDOW = 80.0  # s

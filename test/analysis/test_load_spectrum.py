@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.deviation.load_spectrum import LEAST, TipLoad, find_pulses, tip_load
+from boom_twin.analysis.load_spectrum import LEAST, TipLoad, find_pulses, tip_load
 
 RATE = 200.0
 UP = np.array([0.0, 1.0])
