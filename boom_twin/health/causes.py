@@ -1,22 +1,28 @@
 """Fault hypotheses of a boom, and the decision which of them is named.
 
-Every second gives each hypothesis a gain: its log likelihood less that of the boom as believed. The evidence of a hypothesis is
-the largest sum of its gains up to now, over all possible onsets.
-A cause is named if its posterior probability is high. Three facts limit that.
+Faults of the boom are sizes of its parameters: losses of stiffness, loads, masses. Near the boom as believed the innovations r
+of its filter are linear in these sizes x,
 
-- Successive innovations are not independent. So likelihoods are raised to the power `TEMPER`.
-- An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. In each second no log
-  likelihood counts as more than `MOST_GAIN` below the best.
-- Parameters of a healthy boom are wrong by `Settings.scene_error`. So its likelihood is that of the boom as believed, and
-  what these errors are expected to cost that. Each fault then seems to have a size. So a name needs a size surely above zero
-  by these errors and by its scatter, for all faults together (bound of Bonferroni).
+    r = sum_i S_i x_i + e,    S_i = (r - r_i) / size_i,
+
+with r_i of the twin with fault i alone. A healthy boom has them too: they are `Settings.scene_error`, all the time. A fault is
+a further size of one parameter from its onset on, of unknown amount. So for each onset its most likely size, the variance of
+that, and the factor by which it is more probable than no fault are in closed form (generalised likelihood ratio: A. Willsky and
+H. Jones, IEEE Trans. Automat. Control 21 (1976), 108-112). The evidence of a fault is the mean of that factor over all onsets.
+
+A sensor whose zero drifts, or a late stream, is no size. Each second gives its twin a gain: its log likelihood less that of the
+boom as believed, and less what errors of the scene explain. Its evidence is the mean over all onsets, too.
+
+Two facts limit both. Successive innovations are not independent, so each counts as a share `INDEPENDENT`. And an effect outside
+all hypotheses, such as a valve that opens under a load, may dominate a second: innovations beyond their deviation count less,
+as in the filter, and no log likelihood of a second counts as more than `MOST_GAIN` below the best.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +30,8 @@ import numpy as np
 from ..config.settings import Settings
 from ..deviation.kalman import ANGLE_ZERO
 from ..deviation.predictor import LAG_FLOOR
+from ..deviation.sensors import DOF
+from ..deviation.states import Innovations
 from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
 from ..scene.summary import explain
@@ -32,23 +40,39 @@ from .alarms import UNKNOWN, change_text
 
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
 LATE = 0.02  # s, delay of the stamps of a stream
-TEMPER = math.log(20.0) / 25.0  # power of likelihoods: 25 nats more make a cause 20 times as probable
+INDEPENDENT = 0.25  # share of successive innovations that count as independent
 MOST_GAIN = 12.0  # nats by which the likelihood of a second is below the best, at most
-MEMORY = 60  # s of gains that are kept
+MEMORY = 60  # s in which an onset is looked for
+TINY, NONE = 1e-12, -1e3  # least information; evidence of what cannot be
 
 
 class Fault(NamedTuple):
     """Fault of a boom.
 
-    cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off`` or
-    ``late``. size : relative loss, kg, kg/m, s; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis ``off``
-    lets the zero drift by any amount. is_told : False without an alarm: it competes for its effect alone.
+    cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off``, ``late``, or
+    ``heavier`` of a section. size : relative loss, kg, kg/m, s, relative mass; or the change of a sensor's zero, rad, m/s^2 or
+    N. The hypothesis ``off`` lets the zero drift by any amount. is_told : False without an alarm: it competes for its effect.
     """
 
     cause: str
     kind: str
     size: float = 0.0
     is_told: bool = True
+
+    @property
+    def is_size(self) -> bool:
+        """Whether it is the size of a parameter of the boom."""
+        return self.kind not in ("off", "late")
+
+    def signed(self) -> Fault:
+        """Return the fault with a size above 0: a negative load is ``less``."""
+        return self._replace(kind="less", size=-self.size) if self.kind == "more" and self.size < 0.0 else self
+
+    def changed_by(self, change: Fault) -> Fault:
+        """Return the fault of both this one and a change of its size."""
+        if self.kind == "softer":
+            return self._replace(size=1.0 - (1.0 - self.size) * (1.0 - change.size))
+        return self._replace(kind="more", size=change.size + (self.size if self.kind == "more" else -self.size)).signed()
 
     @property
     def channel(self) -> str:
@@ -85,6 +109,8 @@ def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
         if kind == "softer":
             parts = [name for name in parameter_names(scene) if name.endswith(".k")] if cause == "oil.k" else [cause]
             scene = with_parameters(scene, {name: (1.0 - size) * parameter(scene, name) for name in parts})
+        elif kind == "heavier":
+            scene = with_parameters(scene, {cause: (1.0 + size) * parameter(scene, cause)})
         elif kind == "off":
             name, channels = cause.removesuffix(".sensor"), channels_of(len(scene.joints))
             doubted |= set(channels[Stream.IMU]) if name == "tip_imu" else {name}
@@ -96,14 +122,13 @@ def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
 
 
 def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
-    """Return all single faults that are compared for a boom; warm oil softens all cylinders and is no fault."""
+    """Return all single faults that are compared for a boom; warm oil, which softens all cylinders, and masses are none."""
     mass = explain(scene).mass
     found = [Fault(name, "softer", LOSS) for name in parameter_names(scene) if name.endswith((".k", ".EI", ".stiffness"))]
     found.append(Fault("oil.k", "softer", OIL_LOSS, False))
-    for cause, size in (("tip.payload", LOAD * mass), ("line_fill", 2.0 * LOAD * mass / scene.reach)):
-        found.append(Fault(cause, "more", size))
-        if parameter(scene, cause) > 0.0:
-            found.append(Fault(cause, "less", size))
+    found += [Fault(f"section_{i + 1}.mass", "heavier", LOSS, False) for i in range(len(scene.sections))]
+    found.append(Fault("tip.payload", "more", LOAD * mass))
+    found.append(Fault("line_fill", "more", 2.0 * LOAD * mass / scene.reach))
     names_of = channels_of(len(scene.joints))
     angles = () if reads is StrokeReading.ANGLE else names_of[Stream.ANGLES]
     found += [Fault(f"{name}.sensor", "off") for name in (*angles, "tip_imu", *names_of[Stream.FORCES])]
@@ -127,17 +152,39 @@ def usual_size(scene: Scene, fault: Fault, error: float) -> float:
 
 
 class Verdict(NamedTuple):
-    """Named fault.
+    """Probable fault.
 
-    place : index among the faults compared. rivals : of the other causes that are ranked and have a size; none of a sensor.
-    onset : stamp (ns) of the first second of its evidence. ranked : the three most probable causes with their posterior
-    probabilities, then `UNKNOWN` with the rest.
+    place : index among the faults compared. onset : stamp (ns) of the first second of its evidence. evidence : logarithm of
+    the factor by which it is more probable than no fault. sizes : most likely sizes of all sizes of the boom that are ranked,
+    by their index. ranked : the three most probable causes with their posterior probabilities, then `UNKNOWN` with the rest.
     """
 
     place: int
-    rivals: tuple[int, ...]
     onset: int
+    evidence: float
+    sizes: dict[int, float]
     ranked: tuple[tuple[str, float], ...]
+
+
+class Scores(NamedTuple):
+    """What the innovations of a second tell of sizes x: their log likelihood is slopes . x - x . information . x / 2."""
+
+    slopes: Array
+    information: Array
+
+
+def scores(believed: Innovations, twins: Sequence[Innovations], sizes: Sequence[float]) -> Scores:
+    """Return the scores of a second from the innovations of the boom as believed, and of twins with faults of these sizes.
+
+    Innovations are weighted as by Student's t in the filter. A channel counts if all twins took as many of its readings.
+    """
+    alike = np.all([each.counts == believed.counts for each in twins], axis=0)
+    taken = (np.arange(believed.values.shape[1]) < believed.counts[:, None]) & alike[:, None]
+    deviations = np.sqrt(believed.variances[taken])
+    changes = np.array([believed.values[taken] - each.values[taken] for each in twins])
+    r, s = believed.values[taken] / deviations, changes / (deviations * np.array(sizes)[:, None])
+    weighted = INDEPENDENT * np.minimum((DOF + 1.0) / (DOF + r * r), 1.0) * s
+    return Scores(weighted @ r, weighted @ s.T)
 
 
 class Evidence:
@@ -149,49 +196,71 @@ class Evidence:
     faults : sequence of Fault
     settings : Settings
         With the posterior probability required to name a cause, and the errors of the scene.
+    named : collection of str
+        Causes of named faults: their sizes may grow or shrink.
     """
 
-    def __init__(self, scene: Scene, faults: Sequence[Fault], settings: Settings) -> None:
-        self._odds, self._faults, none = settings.name_odds, tuple(faults), np.zeros(len(faults))
-        self._wrong = none.copy()  # share of a fault's cost that its usual size has: costs are as squares of sizes
-        for i, fault in enumerate(faults):
-            if (fault.kind == "softer" and fault.is_told) or fault.cause == "tip.payload":  # the others repeat these
-                self._wrong[i] = (usual_size(scene, fault, settings.scene_error) / fault.size) ** 2
-                self._wrong[i] /= [x.cause for x in faults].count(fault.cause)
-        self._gains, self._stamps = deque([none], maxlen=MEMORY), deque([0], maxlen=MEMORY)
+    def __init__(self, scene: Scene, faults: Sequence[Fault], settings: Settings, named: Collection[str] = ()) -> None:
+        self._odds, self._faults = settings.name_odds, tuple(faults)
+        self._sized = [i for i, fault in enumerate(faults) if fault.is_size]
+        self._others = [i for i, fault in enumerate(faults) if not fault.is_size]
+        sized = [faults[i] for i in self._sized]
+        self._sizes = np.array([fault.size for fault in sized])
+        loads = [fault.kind == "more" for fault in sized]
+        errors = np.array([OIL_LOSS if fault.cause == "oil.k" else settings.scene_error for fault in sized])
+        self._wrong = np.flatnonzero(~np.array(loads, bool) & (errors > 0.0))
+        self._precisions = np.diag(errors[self._wrong] ** -2.0)
+        grows = [load and parameter(scene, fault.cause) > 0.0 for fault, load in zip(sized, loads, strict=True)]
+        self._both = np.array([is_both or fault.cause in named for fault, is_both in zip(sized, grows, strict=True)])
+        self._faulty = np.array([fault.kind != "heavier" for fault in sized])
+        n = len(sized)
+        self._sums = deque([Scores(np.zeros(n), np.zeros((n, n)))], maxlen=MEMORY)
+        self._gains = deque([np.zeros(len(self._others))], maxlen=MEMORY)
+        self._stamps = deque([0], maxlen=MEMORY)
 
-    def take(self, stamp: int, likelihoods: Array) -> Verdict | None:
-        """Take the log likelihoods of a second that begins at a stamp (ns); return the verdict if a fault is named.
+    def take(self, stamp: int, likelihoods: Array, found: Scores) -> Verdict | None:
+        """Take a second that begins at a stamp (ns); return the verdict if a fault is probable.
 
-        `likelihoods` (1 + faults,) in nats: the boom as believed first.
+        `likelihoods` (1 + faults,) in nats, the boom as believed first; `found` of the faults that are sizes.
         """
-        believed = likelihoods[0] + self._wrong @ np.maximum(likelihoods[0] - likelihoods[1:], 0.0)
-        likelihoods = np.array([believed, *likelihoods[1:]])
-        bounded = np.maximum(likelihoods, likelihoods.max() - MOST_GAIN)
-        self._gains.append(self._gains[-1] + bounded[1:] - bounded[0])
+        bounded = INDEPENDENT * np.maximum(likelihoods, likelihoods.max() - MOST_GAIN)
+        self._gains.append(self._gains[-1] + (bounded[1:] - bounded[0])[self._others])
+        self._sums.append(Scores(*(old + new for old, new in zip(self._sums[-1], found, strict=True))))
         self._stamps.append(stamp)
-        gains = np.array(self._gains)
-        rises = gains[-1] - gains
-        evidence, onsets = rises.max(axis=0), len(rises) - 1 - rises[::-1].argmax(axis=0)
+        slopes, information = (np.array(each) for each in zip(*self._sums, strict=True))
+        b, g = slopes[-1] - slopes[:-1], information[-1] - information[:-1]  # since each onset
+        w = self._wrong
+        covariance = np.linalg.inv(self._precisions + information[-1][np.ix_(w, w)])
+        errors = covariance @ slopes[-1][w]  # of the scene, most likely
+        explained = np.maximum(b[:, w] @ errors - 0.5 * np.einsum("i,kij,j->k", errors, g[:, w][:, :, w], errors), 0.0)
+        shared = g[:, :, w]
+        known = np.maximum(np.einsum("kii->ki", g) - np.einsum("kfi,ij,kfj->kf", shared, covariance, shared), TINY)
+        sizes = (b - shared @ errors) / known
+        ratio = self._sizes**2 * known  # of the variances of a fault's size, before and after
+        factors = 0.5 * (sizes**2 * known * ratio / (1.0 + ratio) - np.log1p(ratio))
+        factors[~(self._faulty & (self._both | (sizes > 0.0)))] = NONE
+        every = np.full((len(b), len(self._faults)), NONE)
+        every[:, self._sized] = factors
+        every[:, self._others] = self._gains[-1] - np.array(self._gains)[:-1] - explained[:, None]
+        best = every.max(axis=0)
+        evidence = best + np.log(np.exp(every - best).mean(axis=0))
         causes = {"": 0.0}  # the healthy boom and each cause are equally probable before
-        for fault, rise in zip(self._faults, evidence.tolist(), strict=True):
-            causes[fault.cause] = max(causes.get(fault.cause, 0.0), rise)
-        weights = np.exp(TEMPER * (np.array(list(causes.values())) - max(causes.values())))
+        for fault, each in zip(self._faults, evidence.tolist(), strict=True):
+            causes[fault.cause] = max(causes.get(fault.cause, NONE), each)
+        weights = np.exp(np.array(list(causes.values())) - max(causes.values()))
         chances = dict(zip(causes, (weights / weights.sum()).tolist(), strict=True))
-        best = int(np.argmax(evidence))
-        if chances[self._faults[best].cause] < self._odds:
+        place = int(np.argmax(evidence))
+        if chances[self._faults[place].cause] < self._odds:
             return None
-        shown = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])[:3]
-        shown.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in shown))))
-        others = {cause for cause, _ in shown if self._faults[best].kind != "off"} - {self._faults[best].cause}
-        sized = [i for i, fault in enumerate(self._faults) if fault.cause in others and fault.is_told and fault.kind != "off"]
-        rivals = tuple(i for i in sized if evidence[i] > 0.0)
-        return Verdict(best, rivals, self._stamps[min(int(onsets[best]) + 1, len(self._stamps) - 1)], tuple(shown))
-
-    def discard(self, place: int) -> None:
-        """Discard the evidence of one fault up to now, because its size is none that is named; others keep theirs."""
-        for gains in self._gains:
-            gains[place] = self._gains[-1][place]
+        ranked = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])[:3]
+        ranked.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in ranked))))
+        onsets, shown = every.argmax(axis=0), {cause for cause, _ in ranked}
+        at = {
+            i: float(sizes[onsets[i], k])
+            for k, i in enumerate(self._sized)
+            if self._faulty[k] and self._faults[i].cause in shown
+        }
+        return Verdict(place, self._stamps[onsets[place] + 1], float(evidence[place]), at, tuple(ranked))
 
 
 def evidence_of(fault: Fault, spread: float) -> str:
