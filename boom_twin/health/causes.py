@@ -15,7 +15,7 @@ boom as believed, and less what errors of the scene explain. Its evidence is the
 
 Two facts limit both. Successive innovations are not independent, so each counts as a share `INDEPENDENT`. And an effect outside
 all hypotheses, such as a valve that opens under a load, may dominate a second: innovations beyond their deviation count less,
-as in the filter, and no log likelihood of a second counts as more than `MOST_GAIN` below the best.
+as in the filter, and no log likelihood of a second is so far below the best that it names a fault alone.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from ..config.settings import Settings
 from ..deviation.kalman import ANGLE_ZERO
@@ -41,7 +42,6 @@ from .alarms import UNKNOWN, change_text
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
 LATE = 0.02  # s, delay of the stamps of a stream
 INDEPENDENT = 0.25  # share of successive innovations that count as independent
-MOST_GAIN = 12.0  # nats by which the likelihood of a second is below the best, at most
 MEMORY = 60  # s in which an onset is looked for
 TINY, NONE = 1e-12, -1e3  # least information; evidence of what cannot be
 
@@ -196,26 +196,36 @@ class Evidence:
     faults : sequence of Fault
     settings : Settings
         With the posterior probability required to name a cause, and the errors of the scene.
+    least : sequence of float
+        Smallest size of each fault that is told.
     named : collection of str
         Causes of named faults: their sizes may grow or shrink.
     """
 
-    def __init__(self, scene: Scene, faults: Sequence[Fault], settings: Settings, named: Collection[str] = ()) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        faults: Sequence[Fault],
+        settings: Settings,
+        least: Sequence[float],
+        named: Collection[str] = (),
+    ) -> None:
         self._odds, self._faults = settings.name_odds, tuple(faults)
-        self._sized = [i for i, fault in enumerate(faults) if fault.is_size]
-        self._others = [i for i, fault in enumerate(faults) if not fault.is_size]
-        sized = [faults[i] for i in self._sized]
-        self._sizes = np.array([fault.size for fault in sized])
-        loads = [fault.kind == "more" for fault in sized]
+        self._sure = math.log(settings.name_odds / (1.0 - settings.name_odds))
+        self._needed = np.full(len(faults), NONE)  # evidence below which a fault is left out
+        self._is_size = np.array([fault.is_size for fault in faults])
+        sized = [fault for fault in faults if fault.is_size]
+        self._sizes, self._least = np.array([fault.size for fault in sized]), np.array(least)[self._is_size]
+        self._is_fault = np.array([fault.kind != "heavier" for fault in sized], bool)
+        self._is_signed = np.array(
+            [fault.cause in named or (fault.kind == "more" and parameter(scene, fault.cause) > 0.0) for fault in sized], bool
+        )
+        self._wrong = np.array([fault.kind != "more" for fault in sized], bool)
         errors = np.array([OIL_LOSS if fault.cause == "oil.k" else settings.scene_error for fault in sized])
-        self._wrong = np.flatnonzero(~np.array(loads, bool) & (errors > 0.0))
         self._precisions = np.diag(errors[self._wrong] ** -2.0)
-        grows = [load and parameter(scene, fault.cause) > 0.0 for fault, load in zip(sized, loads, strict=True)]
-        self._both = np.array([is_both or fault.cause in named for fault, is_both in zip(sized, grows, strict=True)])
-        self._faulty = np.array([fault.kind != "heavier" for fault in sized])
         n = len(sized)
         self._sums = deque([Scores(np.zeros(n), np.zeros((n, n)))], maxlen=MEMORY)
-        self._gains = deque([np.zeros(len(self._others))], maxlen=MEMORY)
+        self._gains = deque([np.zeros(len(faults) - n)], maxlen=MEMORY)
         self._stamps = deque([0], maxlen=MEMORY)
 
     def take(self, stamp: int, likelihoods: Array, found: Scores) -> Verdict | None:
@@ -223,44 +233,57 @@ class Evidence:
 
         `likelihoods` (1 + faults,) in nats, the boom as believed first; `found` of the faults that are sizes.
         """
-        bounded = INDEPENDENT * np.maximum(likelihoods, likelihoods.max() - MOST_GAIN)
-        self._gains.append(self._gains[-1] + (bounded[1:] - bounded[0])[self._others])
+        bounded = np.maximum(INDEPENDENT * likelihoods, INDEPENDENT * likelihoods.max() - self._sure)
+        self._gains.append(self._gains[-1] + (bounded[1:] - bounded[0])[~self._is_size])
         self._sums.append(Scores(*(old + new for old, new in zip(self._sums[-1], found, strict=True))))
         self._stamps.append(stamp)
-        slopes, information = (np.array(each) for each in zip(*self._sums, strict=True))
-        b, g = slopes[-1] - slopes[:-1], information[-1] - information[:-1]  # since each onset
-        w = self._wrong
-        covariance = np.linalg.inv(self._precisions + information[-1][np.ix_(w, w)])
-        errors = covariance @ slopes[-1][w]  # of the scene, most likely
-        explained = np.maximum(b[:, w] @ errors - 0.5 * np.einsum("i,kij,j->k", errors, g[:, w][:, :, w], errors), 0.0)
-        shared = g[:, :, w]
-        known = np.maximum(np.einsum("kii->ki", g) - np.einsum("kfi,ij,kfj->kf", shared, covariance, shared), TINY)
-        sizes = (b - shared @ errors) / known
-        ratio = self._sizes**2 * known  # of the variances of a fault's size, before and after
-        factors = 0.5 * (sizes**2 * known * ratio / (1.0 + ratio) - np.log1p(ratio))
-        factors[~(self._faulty & (self._both | (sizes > 0.0)))] = NONE
-        every = np.full((len(b), len(self._faults)), NONE)
-        every[:, self._sized] = factors
-        every[:, self._others] = self._gains[-1] - np.array(self._gains)[:-1] - explained[:, None]
-        best = every.max(axis=0)
+        sizes, factors, explained = self._sizes_by_onset()
+        every = np.empty((len(factors), len(self._faults)))
+        every[:, self._is_size] = factors
+        every[:, ~self._is_size] = self._gains[-1] - np.array(self._gains)[:-1] - explained[:, None]
+        best, onsets = every.max(axis=0), len(every) - 1 - every[::-1].argmax(axis=0)
         evidence = best + np.log(np.exp(every - best).mean(axis=0))
-        causes = {"": 0.0}  # the healthy boom and each cause are equally probable before
-        for fault, each in zip(self._faults, evidence.tolist(), strict=True):
-            causes[fault.cause] = max(causes.get(fault.cause, NONE), each)
-        weights = np.exp(np.array(list(causes.values())) - max(causes.values()))
+        evidence[evidence < self._needed] = NONE
+        causes = {"": 0.0} | {fault.cause: each for fault, each in zip(self._faults, evidence.tolist(), strict=True)}
+        weights = np.exp(np.array(list(causes.values())) - max(causes.values()))  # all are equally probable before
         chances = dict(zip(causes, (weights / weights.sum()).tolist(), strict=True))
         place = int(np.argmax(evidence))
         if chances[self._faults[place].cause] < self._odds:
             return None
         ranked = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])[:3]
         ranked.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in ranked))))
-        onsets, shown = every.argmax(axis=0), {cause for cause, _ in ranked}
-        at = {
-            i: float(sizes[onsets[i], k])
-            for k, i in enumerate(self._sized)
-            if self._faulty[k] and self._faults[i].cause in shown
-        }
-        return Verdict(place, self._stamps[onsets[place] + 1], float(evidence[place]), at, tuple(ranked))
+        shown, likely = {cause for cause, _ in ranked}, np.full(len(self._faults), math.nan)
+        likely[self._is_size] = np.where(self._is_fault, sizes[onsets[self._is_size], np.arange(len(self._sizes))], math.nan)
+        found_sizes = {i: size for i, size in enumerate(likely.tolist()) if size == size and self._faults[i].cause in shown}
+        return Verdict(place, self._stamps[onsets[place] + 1], float(evidence[place]), found_sizes, tuple(ranked))
+
+    def _sizes_by_onset(self) -> tuple[Array, Array, Array]:
+        """Return the likeliest sizes by onset and fault, the logarithms of their factors, and what errors of the scene explain.
+
+        With slopes b and information G since an onset, and errors x of the scene of covariance P, the size of fault j is
+        (b_j - G_j. x) / (G_jj - G_j. P G_.j). One over the denominator is its variance.
+        """
+        slopes, information = (np.array(each) for each in zip(*self._sums, strict=True))
+        b, g, w = slopes[-1] - slopes[:-1], information[-1] - information[:-1], self._wrong
+        covariance = np.linalg.inv(self._precisions + information[-1][np.ix_(w, w)])
+        errors, shared = covariance @ slopes[-1][w], g[:, :, w]
+        explained = np.maximum(b[:, w] @ errors - 0.5 * np.einsum("i,kij,j->k", errors, shared[:, w], errors), 0.0)
+        known = np.einsum("kii->ki", g) - np.einsum("kfi,ij,kfj->kf", shared, covariance, shared)
+        sizes = (b - shared @ errors) / np.maximum(known, TINY)
+        ratio = self._sizes**2 * np.maximum(known, TINY)  # of the variances of a fault's size, before and after
+        factors = 0.5 * (sizes**2 * known * ratio / (1.0 + ratio) - np.log1p(ratio)) + self._above(sizes, ratio)
+        return sizes, np.where(self._is_fault, factors, NONE), explained
+
+    def _above(self, sizes: Array, ratio: Array) -> Array:
+        """Return how much more probable sizes are above the least ones than they were before; logarithm of the factor."""
+        means, deviations = sizes * ratio / (1.0 + ratio), self._sizes / np.sqrt(1.0 + ratio)
+        above, below = log_ndtr((means - self._least) / deviations), log_ndtr((-means - self._least) / deviations)
+        after = np.where(self._is_signed, np.logaddexp(above, below) - math.log(2.0), above)
+        return np.asarray(after - log_ndtr(-self._least / self._sizes))
+
+    def postpone(self, place: int, evidence: float) -> None:
+        """Leave out a sensor or a lag whose size is not sure until its evidence has grown by what a name needs."""
+        self._needed[place] = evidence + self._sure
 
 
 def evidence_of(fault: Fault, spread: float) -> str:

@@ -166,10 +166,11 @@ class FaultSearch:
 
     def _decide_anew(self) -> None:
         """Discard all evidence of faults."""
-        named = {fault.cause for fault in self._named}
-        self._decision, self._age = Evidence(self._scene, self._faults, self._settings, named), 0
-        self._tried: dict[int, float] = {}  # evidence of faults whose size was not sure by then
         self._certain = NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - self._settings.name_odds) / len(self._faults))  # Bonferroni
+        least = [self._certain * usual_size(self._scene, fault, self._settings.scene_error) for fault in self._faults]
+        named = {fault.cause for fault in self._named}
+        self._decision, self._age = Evidence(self._scene, self._faults, self._settings, least, named), 0
+        self._unsure: dict[int, float] = {}  # evidence of faults below which their sizes are not looked for again
         self._evidence = np.array([twin.evidence for twin in self._twins])
 
     def _made(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower]:
@@ -231,22 +232,26 @@ class FaultSearch:
         """Name the fault of a verdict, change its size, or end it; return its alarm if it begins or ends.
 
         Far from the boom as believed innovations are not linear in sizes. So all ranked ones are sized by twins, and the one
-        that is likeliest at its own size is named if no other is as likely. Without a sure size this is tried again once the
-        evidence has grown by what a name needs.
+        that is likeliest at its own size is named if no other is as likely. Otherwise all are sized again once the evidence
+        has grown by what a name needs.
         """
         fault, begin = self._faults[verdict.place], verdict.onset
         if fault in self._named:  # a lag
             return self._ended(fault, begin)
-        if self._may_leak(fault, stamp - begin) or verdict.evidence < self._tried.get(verdict.place, -math.inf) + self._sure:
+        is_softer = fault.kind == "softer" and verdict.sizes[verdict.place] > 0.0
+        if (is_softer and self._may_leak(fault, stamp - begin)) or verdict.evidence < self._unsure.get(verdict.place, 0.0):
             return []
         faults = {verdict.place: fault}
         for place, size in verdict.sizes.items() if fault.is_size else ():
             faults[place] = self._faults[place]._replace(size=math.copysign(self._faults[place].size, size))
         sizes = {place: self._sized(each, begin) for place, each in faults.items()}
         likely = sorted((each[3], place, each) for place, each in sizes.items() if each is not None)
-        if fault.is_size or not likely:
-            self._tried[verdict.place] = verdict.evidence
-        if not likely or any(INDEPENDENT * (likely[-1][0] - gain) < self._sure for gain, _, _ in likely[:-1]):
+        is_tied = any(likely[-1][0] - gain < self._sure for gain, _, _ in likely[:-1])
+        if sizes[verdict.place] is None or is_tied:
+            if fault.is_size:
+                self._unsure[verdict.place] = verdict.evidence + self._sure
+            else:
+                self._decision.postpone(verdict.place, verdict.evidence)
             return []
         place, (sized, spread, onset, _) = likely[-1][1:]
         if fault.kind == "off" and abs(sized.size) < self._certain * spread:  # its zero still drifts
@@ -257,7 +262,7 @@ class FaultSearch:
         evidence = evidence_of(named, spread) if named.is_told else ""
         chances = dict(verdict.ranked)
         if fault.is_size:  # those of sizes, by their likelihoods at their own sizes
-            weights = {each[0].cause: math.exp(INDEPENDENT * (gain - likely[-1][0])) for gain, _, each in reversed(likely)}
+            weights = {each[0].cause: math.exp(gain - likely[-1][0]) for gain, _, each in reversed(likely)}
             share = (1.0 - chances[UNKNOWN]) / sum(weights.values())
             chances = {cause: share * weight for cause, weight in weights.items()} | {UNKNOWN: chances[UNKNOWN]}
         causes = tuple(Ranked(cause, chance, ()) for cause, chance in chances.items())
@@ -270,7 +275,7 @@ class FaultSearch:
 
         A leak would show within `SPAN`. A joint's sensor that is off may be that transducer.
         """
-        if not (fault.cause.startswith("cylinder_") and fault.kind == "softer"):
+        if not fault.cause.startswith("cylinder_"):
             return False
         number = int(fault.channel.removeprefix("cylinder_"))
         is_off = any(each.cause == f"joint_{number}.sensor" for each in self._named)
@@ -302,8 +307,9 @@ class FaultSearch:
         return None
 
     def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float, int, float] | None:
-        """Return a fault of the most likely size, its deviation, its onset, not before `onset` (ns), and its gain since then.
+        """Return a fault of the most likely size, its deviation, its onset, not before `onset` (ns), and its log posterior.
 
+        The size of `fault` is the standard deviation that sizes have before anything is read.
         Twins of larger and smaller sizes follow the recent seconds until the likelihood falls on both sides. The deviation is
         that of the sizes without each second (jackknife), also where the model is inexact. None if the size is not surely above
         that of healthy booms, or if a force's is below the set deviation.
@@ -340,7 +346,8 @@ class FaultSearch:
             without = 0.5 * np.diff(slopes + 2.0 * curves * change, append=0.0) / (curves[0] + np.diff(curves, append=0.0))
         sized, spread = fault._replace(size=sizes[best] + change), math.hypot(float(np.linalg.norm(without)), usual)
         is_known = abs(sized.size) > self._certain * spread
-        return (sized, spread, onset + first * SECOND, float(gains[best][first])) if is_known else None
+        gain = INDEPENDENT * float(gains[best][first]) - 0.5 * (sized.size / fault.size) ** 2
+        return (sized, spread, onset + first * SECOND, gain) if is_known else None
 
     def _course(self, fault: Fault, onset: int) -> Array:
         """Return the log likelihood of each recent second since the onset; `IMPOSSIBLE` for an impossible boom."""
