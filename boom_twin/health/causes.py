@@ -22,133 +22,25 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import log_ndtr
 
 from ..config.settings import Settings
-from ..deviation.kalman import ANGLE_ZERO
-from ..deviation.predictor import LAG_FLOOR
 from ..deviation.sensors import DOF
 from ..deviation.states import Innovations
-from ..scene.edit import loaded, parameter, parameter_names, with_parameters
+from ..scene.edit import parameter
 from ..scene.schema import Scene
-from ..scene.summary import explain
-from ..types import Alarm, Array, Stream, StrokeReading, channels_of, sensor_kind
-from .alarms import UNKNOWN, change_text
+from ..types import Array
+from .alarms import UNKNOWN
+from .faults import OIL_LOSS, Fault
 
-LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
-LATE = 0.02  # s, delay of the stamps of a stream
 INDEPENDENT = 0.25  # share of successive innovations that count as independent
 MEMORY = 60  # s in which an onset is looked for
+RATIO = 1.4  # of successive trial sizes of a fault
 TINY, NONE = 1e-12, -1e3  # least information; evidence of what cannot be
-
-
-class Fault(NamedTuple):
-    """Fault of a boom.
-
-    cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off``, ``late``, or
-    ``heavier`` of a section. size : relative loss, kg, kg/m, s, relative mass; or the change of a sensor's zero, rad, m/s^2 or
-    N. The hypothesis ``off`` lets the zero drift by any amount. is_told : False without an alarm: it competes for its effect.
-    """
-
-    cause: str
-    kind: str
-    size: float = 0.0
-    is_told: bool = True
-
-    @property
-    def is_size(self) -> bool:
-        """Whether it is the size of a parameter of the boom."""
-        return self.kind not in ("off", "late")
-
-    def signed(self) -> Fault:
-        """Return the fault with a size above 0: a negative load is ``less``."""
-        return self._replace(kind="less", size=-self.size) if self.kind == "more" and self.size < 0.0 else self
-
-    def changed_by(self, change: Fault) -> Fault:
-        """Return the fault of both this one and a change of its size."""
-        if self.kind == "softer":
-            return self._replace(size=1.0 - (1.0 - self.size) * (1.0 - change.size))
-        return self._replace(kind="more", size=change.size + (self.size if self.kind == "more" else -self.size)).signed()
-
-    @property
-    def channel(self) -> str:
-        """Channel of its alarm."""
-        return "tip" if self.kind in ("more", "less") else self.cause.partition(".")[0]
-
-
-class Hypothesis(NamedTuple):
-    """Boom with faults.
-
-    scene : with its parameters changed. payload, line_fill : additional load, kg and kg/m. doubted : channels whose zeros may
-    drift by any amount. delays : delay of the stamps of a stream, s.
-    """
-
-    scene: Scene
-    payload: float = 0.0
-    line_fill: float = 0.0
-    doubted: frozenset[str] = frozenset()
-    delays: tuple[tuple[Stream, float], ...] = ()
-
-    def load(self, payload: float, line_fill: float) -> dict[str, float]:
-        """Return the load of this boom from a set load (kg, kg/m; below 0: that of the scene)."""
-        told = loaded(self.scene, payload, line_fill)
-        return {
-            "payload": max(parameter(told, "tip.payload") + self.payload, 0.0),
-            "line_fill": max(parameter(told, "line_fill") + self.line_fill, 0.0),
-        }
-
-
-def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
-    """Return the boom of a scene with these faults."""
-    extra, doubted, delays = {"tip.payload": 0.0, "line_fill": 0.0}, set[str](), list[tuple[Stream, float]]()
-    for cause, kind, size, _ in faults:
-        if kind == "softer":
-            parts = [name for name in parameter_names(scene) if name.endswith(".k")] if cause == "oil.k" else [cause]
-            scene = with_parameters(scene, {name: (1.0 - size) * parameter(scene, name) for name in parts})
-        elif kind == "heavier":
-            scene = with_parameters(scene, {cause: (1.0 + size) * parameter(scene, cause)})
-        elif kind == "off":
-            name, channels = cause.removesuffix(".sensor"), channels_of(len(scene.joints))
-            doubted |= set(channels[Stream.IMU]) if name == "tip_imu" else {name}
-        elif kind == "late":
-            delays.append((Stream(cause.removesuffix(".delay")), size))
-        else:
-            extra[cause] += size if kind == "more" else -size
-    return Hypothesis(scene, extra["tip.payload"], extra["line_fill"], frozenset(doubted), tuple(delays))
-
-
-def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
-    """Return all single faults that are compared for a boom; warm oil, which softens all cylinders, and masses are none."""
-    mass = explain(scene).mass
-    found = [Fault(name, "softer", LOSS) for name in parameter_names(scene) if name.endswith((".k", ".EI", ".stiffness"))]
-    found.append(Fault("oil.k", "softer", OIL_LOSS, False))
-    found += [Fault(f"section_{i + 1}.mass", "heavier", LOSS, False) for i in range(len(scene.sections))]
-    found.append(Fault("tip.payload", "more", LOAD * mass))
-    found.append(Fault("line_fill", "more", 2.0 * LOAD * mass / scene.reach))
-    names_of = channels_of(len(scene.joints))
-    angles = () if reads is StrokeReading.ANGLE else names_of[Stream.ANGLES]
-    found += [Fault(f"{name}.sensor", "off") for name in (*angles, "tip_imu", *names_of[Stream.FORCES])]
-    streams = dict.fromkeys((reads.stream, Stream.ANGLES, Stream.IMU, Stream.FORCES))
-    return [*found, *(Fault(f"{stream.value}.delay", "late", LATE) for stream in streams)]
-
-
-def usual_size(scene: Scene, fault: Fault, error: float) -> float:
-    """Return the standard deviation of what looks like a fault in a healthy boom whose parameters are wrong by `error`.
-
-    Independent mass errors of n equal sections turn a straight boom of mass M like a payload of `error` M / sqrt(3 n).
-    """
-    if fault.kind == "softer":
-        return error
-    if fault.kind == "off":  # a part that is wrong turns a joint as its sensor's zero would
-        return ANGLE_ZERO if fault.channel.startswith("joint_") else 0.0
-    if fault.kind == "late":
-        return LAG_FLOOR
-    payload = error * explain(scene).mass / math.sqrt(3.0 * len(scene.sections))
-    return payload if fault.cause == "tip.payload" else 2.0 * payload / scene.reach
 
 
 class Verdict(NamedTuple):
@@ -164,6 +56,21 @@ class Verdict(NamedTuple):
     evidence: float
     sizes: dict[int, float]
     ranked: tuple[tuple[str, float], ...]
+
+
+class Likeliest(NamedTuple):
+    """Most likely size of a fault.
+
+    spread : standard deviation of the sizes without each second (jackknife), which holds where the model is inexact. onset :
+    number of the first second. probability : log posterior probability density, up to a constant of all faults. half : gain of
+    half the size. The likelihood of a fault rises up to its size; that of a twin that opens another valve may jump.
+    """
+
+    size: float
+    spread: float
+    onset: int
+    probability: float
+    half: float
 
 
 class Scores(NamedTuple):
@@ -286,19 +193,45 @@ class Evidence:
         self._needed[place] = evidence + self._sure
 
 
-def evidence_of(fault: Fault, spread: float) -> str:
-    """Return size and standard deviation of a fault as figures."""
-    size = -fault.size if fault.kind in ("softer", "less") else fault.size
-    if fault.kind == "softer":
-        return f"{fault.cause.rpartition('.')[2]} {100.0 * size:.0f} % (+- {100.0 * spread:.0f})"
-    if fault.channel == "tip":
-        return change_text(size, "kg" if fault.cause == "tip.payload" else "kg/m", spread)
-    if fault.kind == "late":
-        return change_text(1e3 * size, "ms", 1e3 * spread)
-    return change_text(size, sensor_kind(fault.channel.replace("tip_imu", "tip_imu_x")).unit, spread)
+def likeliest(size: float, least: float, course: Callable[[float], Array]) -> Likeliest | None:
+    """Return the most likely size by twins of larger and smaller sizes, until the likelihood falls on both sides.
 
+    Parameters
+    ----------
+    size : float
+        First trial, and the standard deviation that sizes have before anything is read.
+    least : float
+        Where to end if smaller sizes are ever more likely.
+    course : callable
+        Size -> log likelihood of each second since a possible onset, shape (k,).
 
-def explains(named: Alarm, stream: Stream, deviation: Alarm) -> bool:
-    """Return True if a named fault explains a deviation: a load those of forces, a sensor that of its channel."""
-    is_load = named.kind in ("more", "less") and stream is Stream.FORCES
-    return is_load or (named.channel == deviation.channel and named.kind == "off")
+    Returns
+    -------
+    Likeliest or None
+        None if the smallest trial is the most likely one.
+    """
+    healthy = course(0.0)
+
+    def gained(size: float) -> Array:
+        """Return the gain of a size by onset: the sum of those of the seconds from there."""
+        return np.asarray((course(size) - healthy)[::-1].cumsum()[::-1])
+
+    sizes = [size / RATIO, size]
+    gains = [gained(each) for each in sizes]
+    while gains[-1].max() > gains[-2].max():
+        sizes.append(RATIO * sizes[-1])
+        gains.append(gained(sizes[-1]))
+    while gains[0].max() > gains[1].max() and abs(sizes[0]) > least:
+        sizes.insert(0, sizes[0] / RATIO)
+        gains.insert(0, gained(sizes[0]))
+    best = int(np.argmax([each.max() for each in gains]))
+    if best == 0:
+        return None
+    first, changes = int(gains[best].argmax()), np.array(sizes[best - 1 : best + 2]) - sizes[best]
+    curves, slopes, _ = np.polyfit(changes, [each[first:] for each in gains[best - 1 : best + 2]], 2)
+    change = float(np.clip(-0.5 * slopes[0] / curves[0], changes.min(), changes.max()))
+    with np.errstate(divide="ignore", invalid="ignore"):  # nothing is left without the only second
+        without = 0.5 * np.diff(slopes + 2.0 * curves * change, append=0.0) / (curves[0] + np.diff(curves, append=0.0))
+    found = sizes[best] + change
+    probability = INDEPENDENT * float(gains[best][first]) - 0.5 * (found / size) ** 2
+    return Likeliest(found, float(np.linalg.norm(without)), first, probability, INDEPENDENT * float(gained(0.5 * found)[first]))

@@ -22,25 +22,13 @@ from ..config.settings import Settings
 from ..deviation.states import Innovations
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
-from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
+from ..types import SECOND, Alarm, Array, Change, Ranked, StrokeReading
 from .alarms import UNKNOWN
-from .causes import (
-    INDEPENDENT,
-    MEMORY,
-    Evidence,
-    Fault,
-    Hypothesis,
-    Verdict,
-    evidence_of,
-    hypothesis,
-    possible_faults,
-    scores,
-    usual_size,
-)
+from .causes import MEMORY, Evidence, Verdict, likeliest, scores
 from .creep import SPAN, CreepMonitor
+from .faults import Fault, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
 from .sensor_check import CAME_BACK, Flags
 
-RATIO = 1.4  # of successive trial sizes of a named fault
 IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
 DELAY = 2  # s from the end of a second to its verdict
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
@@ -309,10 +297,8 @@ class FaultSearch:
     def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float, int, float] | None:
         """Return a fault of the most likely size, its deviation, its onset, not before `onset` (ns), and its log posterior.
 
-        The size of `fault` is the standard deviation that sizes have before anything is read.
-        Twins of larger and smaller sizes follow the recent seconds until the likelihood falls on both sides. The deviation is
-        that of the sizes without each second (jackknife), also where the model is inexact. None if the size is not surely above
-        that of healthy booms, or if a force's is below the set deviation.
+        None if the size is not surely above that of healthy booms, if half of it is not likelier than none, or if a force's is
+        below the set deviation.
         """
         usual = usual_size(self._scene, fault, self._settings.scene_error)
         if fault.kind == "off":
@@ -321,33 +307,12 @@ class FaultSearch:
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
             is_known = abs(changed.size) > max(least, self._certain * spread)
             return (changed, math.hypot(spread, drift), onset, 0.0) if is_known else None
-        healthy = self._course(fault._replace(size=0.0), onset)
-
-        def gained(size: float) -> Array:
-            """Return the gain of a size by onset: the sum of those of the seconds from there."""
-            gains = self._course(fault._replace(size=size), onset) - healthy
-            return np.asarray(gains[::-1].cumsum()[::-1])
-
-        sizes = [fault.size / RATIO, fault.size]
-        gains = [gained(size) for size in sizes]
-        while gains[-1].max() > gains[-2].max():
-            sizes.append(RATIO * sizes[-1])
-            gains.append(gained(sizes[-1]))
-        while gains[0].max() > gains[1].max() and abs(sizes[0]) > self._certain * usual:
-            sizes.insert(0, sizes[0] / RATIO)
-            gains.insert(0, gained(sizes[0]))
-        best = int(np.argmax([each.max() for each in gains]))
-        if best == 0:
+        found = likeliest(fault.size, self._certain * usual, lambda size: self._course(fault._replace(size=size), onset))
+        if found is None:
             return None
-        first, changes = int(gains[best].argmax()), np.array(sizes[best - 1 : best + 2]) - sizes[best]
-        curves, slopes, _ = np.polyfit(changes, [each[first:] for each in gains[best - 1 : best + 2]], 2)
-        change = float(np.clip(-0.5 * slopes[0] / curves[0], changes.min(), changes.max()))
-        with np.errstate(divide="ignore", invalid="ignore"):  # nothing is left without the only second
-            without = 0.5 * np.diff(slopes + 2.0 * curves * change, append=0.0) / (curves[0] + np.diff(curves, append=0.0))
-        sized, spread = fault._replace(size=sizes[best] + change), math.hypot(float(np.linalg.norm(without)), usual)
-        is_known = abs(sized.size) > self._certain * spread
-        gain = INDEPENDENT * float(gains[best][first]) - 0.5 * (sized.size / fault.size) ** 2
-        return (sized, spread, onset + first * SECOND, gain) if is_known else None
+        spread = math.hypot(found.spread, usual)
+        is_known = abs(found.size) > self._certain * spread and found.half > self._sure
+        return (fault._replace(size=found.size), spread, onset + found.onset * SECOND, found.probability) if is_known else None
 
     def _course(self, fault: Fault, onset: int) -> Array:
         """Return the log likelihood of each recent second since the onset; `IMPOSSIBLE` for an impossible boom."""
@@ -390,18 +355,7 @@ class FaultSearch:
 def _feed(twin: Follower, each: Hypothesis, second: Second) -> None:
     if second.left_out is not None:
         twin.leave_out(*second.left_out)
-    twin.take(_in_time(second.block, each))
-
-
-def _in_time(block: Any, each: Hypothesis) -> Any:
-    """Return a block with stamps corrected by the delays of a hypothesis, in the order of time."""
-    if not each.delays:
-        return block
-    stamps = block.stamps.copy()
-    for stream, delay in each.delays:
-        stamps -= round(delay * SECOND) * (block.streams == list(Stream).index(stream))
-    order = np.argsort(stamps, kind="stable")
-    return block._replace(streams=block.streams[order], stamps=stamps[order], values=block.values[order])
+    twin.take(each.in_time(second.block))
 
 
 def _changed(change: Change, each: Hypothesis) -> Change:

@@ -11,9 +11,9 @@ from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, SENSORS, Alarm, Array, Health, Mount, Place, Stream, StrokeReading
 from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows
-from .causes import explains
 from .deviations import SIGMAS, DeviationMonitor
 from .fault_twins import FaultTwins
+from .faults import explains
 from .lag_monitor import LagMonitor
 from .sensor_check import NOISE_OVER, Readings, SensorCheck, StreamReadings, sensor_ranges
 from .sensor_monitor import SensorMonitor

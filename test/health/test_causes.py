@@ -13,8 +13,9 @@ from scipy.stats import multivariate_normal, norm
 from boom_twin import load_scene
 from boom_twin.config.settings import Settings
 from boom_twin.deviation.states import Innovations
-from boom_twin.health.causes import INDEPENDENT, Evidence, Fault, Scores, hypothesis, possible_faults, scores
+from boom_twin.health.causes import INDEPENDENT, Evidence, Scores, scores
 from boom_twin.health.fault_twins import FaultTwins
+from boom_twin.health.faults import Fault, hypothesis, possible_faults
 from boom_twin.texts import alarm_text
 from boom_twin.twin.blocks import SampleBlock
 from boom_twin.types import SECOND, Change, Stream
