@@ -5,10 +5,11 @@ of its filter are linear in these sizes x,
 
     r = sum_i S_i x_i + e,    S_i = (r - r_i) / size_i,
 
-with r_i of the twin with fault i alone. A healthy boom has them too: they are `Settings.scene_error`, all the time. A fault is
-a further size of one parameter from its onset on, of unknown amount. So for each onset its most likely size, the variance of
-that, and the factor by which it is more probable than no fault are in closed form (generalised likelihood ratio: A. Willsky and
-H. Jones, IEEE Trans. Automat. Control 21 (1976), 108-112). The evidence of a fault is the mean of that factor over all onsets.
+with r_i of the twin with fault i alone. A healthy boom has sizes, too: they are `Settings.scene_error`, all the time. Because no
+model of a moving boom is exact, they are `UNSTEADY` times that besides, anew in each second. A fault is a further size of one
+parameter from its onset on, of unknown amount. So for each onset its most likely size, the variance of that, and the factor by
+which it is more probable than no fault are in closed form (generalised likelihood ratio: A. Willsky and H. Jones, IEEE Trans.
+Automat. Control 21 (1976), 108-112). The evidence of a fault is the mean of that factor over all onsets.
 
 A sensor whose zero drifts, or a late stream, is no size. Each second gives its twin a gain: its log likelihood less that of the
 boom as believed, and less what errors of the scene explain. Its evidence is the mean over all onsets, too.
@@ -37,7 +38,8 @@ from ..types import Array
 from .alarms import UNKNOWN
 from .faults import OIL_LOSS, Fault
 
-INDEPENDENT = 0.25  # share of successive innovations that count as independent
+INDEPENDENT = 0.35  # share of successive innovations that count as independent
+UNSTEADY = 3.0  # errors of a second over lasting ones
 MEMORY = 60  # s in which an onset is looked for
 RATIO = 1.4  # of successive trial sizes of a fault
 TINY, NONE = 1e-12, -1e3  # least information; evidence of what cannot be
@@ -103,8 +105,10 @@ class Evidence:
     faults : sequence of Fault
     settings : Settings
         With the posterior probability required to name a cause, and the errors of the scene.
-    least : sequence of float
-        Smallest size of each fault that is told.
+    errors : sequence of float
+        Sizes that healthy booms seem to have, standard deviation of each.
+    certain : float
+        Smallest size of a fault that is told, over that.
     named : collection of str
         Causes of named faults: their sizes may grow or shrink.
     """
@@ -114,7 +118,8 @@ class Evidence:
         scene: Scene,
         faults: Sequence[Fault],
         settings: Settings,
-        least: Sequence[float],
+        errors: Sequence[float],
+        certain: float,
         named: Collection[str] = (),
     ) -> None:
         self._odds, self._faults = settings.name_odds, tuple(faults)
@@ -122,14 +127,15 @@ class Evidence:
         self._needed = np.full(len(faults), NONE)  # evidence below which a fault is left out
         self._is_size = np.array([fault.is_size for fault in faults])
         sized = [fault for fault in faults if fault.is_size]
-        self._sizes, self._least = np.array([fault.size for fault in sized]), np.array(least)[self._is_size]
+        self._sizes, own = np.array([fault.size for fault in sized]), np.array(errors)[self._is_size]
+        self._least, self._unsteady = certain * own, np.diag((UNSTEADY * own) ** 2)
         self._is_fault = np.array([fault.kind != "heavier" for fault in sized], bool)
         self._is_signed = np.array(
             [fault.cause in named or (fault.kind == "more" and parameter(scene, fault.cause) > 0.0) for fault in sized], bool
         )
         self._wrong = np.array([fault.kind != "more" for fault in sized], bool)
-        errors = np.array([OIL_LOSS if fault.cause == "oil.k" else settings.scene_error for fault in sized])
-        self._precisions = np.diag(errors[self._wrong] ** -2.0)
+        own = np.where([fault.cause == "oil.k" for fault in sized], OIL_LOSS, own)
+        self._precisions = np.diag(own[self._wrong] ** -2.0)
         n = len(sized)
         self._sums = deque([Scores(np.zeros(n), np.zeros((n, n)))], maxlen=MEMORY)
         self._gains = deque([np.zeros(len(faults) - n)], maxlen=MEMORY)
@@ -142,7 +148,8 @@ class Evidence:
         """
         bounded = np.maximum(INDEPENDENT * likelihoods, INDEPENDENT * likelihoods.max() - self._sure)
         self._gains.append(self._gains[-1] + (bounded[1:] - bounded[0])[~self._is_size])
-        self._sums.append(Scores(*(old + new for old, new in zip(self._sums[-1], found, strict=True))))
+        steady = np.linalg.inv(np.eye(len(self._sizes)) + found.information @ self._unsteady)
+        self._sums.append(Scores(*(old + steady @ new for old, new in zip(self._sums[-1], found, strict=True))))
         self._stamps.append(stamp)
         sizes, factors, explained = self._sizes_by_onset()
         every = np.empty((len(factors), len(self._faults)))

@@ -155,9 +155,9 @@ class FaultSearch:
     def _decide_anew(self) -> None:
         """Discard all evidence of faults."""
         self._certain = NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - self._settings.name_odds) / len(self._faults))  # Bonferroni
-        least = [self._certain * usual_size(self._scene, fault, self._settings.scene_error) for fault in self._faults]
+        errors = [usual_size(self._scene, fault, self._settings.scene_error) for fault in self._faults]
         named = {fault.cause for fault in self._named}
-        self._decision, self._age = Evidence(self._scene, self._faults, self._settings, least, named), 0
+        self._decision, self._age = Evidence(self._scene, self._faults, self._settings, errors, self._certain, named), 0
         self._unsure: dict[int, float] = {}  # evidence of faults below which their sizes are not looked for again
         self._evidence = np.array([twin.evidence for twin in self._twins])
 

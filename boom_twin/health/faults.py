@@ -125,7 +125,7 @@ def usual_size(scene: Scene, fault: Fault, error: float) -> float:
 
     Independent mass errors of n equal sections turn a straight boom of mass M like a payload of `error` M / sqrt(3 n).
     """
-    if fault.kind == "softer":
+    if fault.kind in ("softer", "heavier"):
         return error
     if fault.kind == "off":  # a part that is wrong turns a joint as its sensor's zero would
         return ANGLE_ZERO if fault.channel.startswith("joint_") else 0.0

@@ -13,7 +13,7 @@ from scipy.stats import multivariate_normal, norm
 from boom_twin import load_scene
 from boom_twin.config.settings import Settings
 from boom_twin.deviation.states import Innovations
-from boom_twin.health.causes import INDEPENDENT, Evidence, Scores, scores
+from boom_twin.health.causes import INDEPENDENT, UNSTEADY, Evidence, Scores, scores
 from boom_twin.health.fault_twins import FaultTwins
 from boom_twin.health.faults import Fault, hypothesis, possible_faults
 from boom_twin.texts import alarm_text
@@ -28,12 +28,12 @@ SPRING, SECTION, LOAD = (
 MASS = Fault("section_2.mass", "heavier", 0.25, False)
 IMU, JOINT = Fault("tip_imu.sensor", "off"), Fault("joint_2.sensor", "off")
 SETTINGS = Settings()
-LEAST = {SPRING: 0.06, SECTION: 0.06, LOAD: 12.0, MASS: 0.0}
+ERRORS = {SPRING: 0.02, SECTION: 0.02, LOAD: 4.0, MASS: 0.02}
 
 
 def evidence_of(faults):
     """Return the evidence of these faults, with their smallest sizes."""
-    return Evidence(load_scene(), faults, SETTINGS, [LEAST.get(fault, 0.0) for fault in faults])
+    return Evidence(load_scene(), faults, SETTINGS, [ERRORS.get(fault, 0.0) for fault in faults], 3.0)
 
 
 def verdict(faults, gains):
@@ -47,12 +47,12 @@ def verdict(faults, gains):
 
 def test_a_name_needs_its_posterior():
     """A cause is named once its gain, of the mean onset, makes it 19 times as probable as that nothing is wrong."""
-    found, second = verdict([IMU, JOINT], [[-9.0, -9.0]] * 20 + [[10.0, -9.0]] * 30)
-    rises = INDEPENDENT * 10.0 * np.arange(1, second - 18)
+    found, second = verdict([IMU, JOINT], [[-8.0, -8.0]] * 20 + [[8.0, -8.0]] * 30)
+    rises = INDEPENDENT * 8.0 * np.arange(1, second - 18)
     assert found.evidence == pytest.approx(
-        np.log((np.exp(rises).sum() + sum(np.exp(rises[-1] - INDEPENDENT * 9.0 * i) for i in range(1, 21))) / (second + 1))
+        np.log((np.exp(rises).sum() + sum(np.exp(rises[-1] - INDEPENDENT * 8.0 * i) for i in range(1, 21))) / (second + 1))
     )
-    assert math.log(19.0) < found.evidence < math.log(19.0) + INDEPENDENT * 10.0
+    assert math.log(19.0) < found.evidence < math.log(19.0) + INDEPENDENT * 8.0
     assert (found.place, found.onset) == (0, 20 * SECOND)
     assert found.ranked[0] == ("tip_imu.sensor", pytest.approx(0.975, abs=0.025))
     assert sum(chance for _, chance in found.ranked) <= 1.0
@@ -91,8 +91,13 @@ def test_evidence_is_the_ratio_of_likelihoods_of_gaussian_readings():
         twins = [innovations_of(seen[second] - fault.size * slope[second]) for fault, slope in zip(faults, slopes, strict=True)]
         row = scores(innovations_of(seen[second]), twins, [each.size for each in faults])
         found = evidence.take(second * SECOND, np.zeros(5), row)
-    wrong = slopes[[0, 1, 3]].reshape(3, -1)
-    readings = multivariate_normal(np.zeros(320), np.eye(320) / INDEPENDENT + SETTINGS.scene_error**2 * wrong.T @ wrong)
+    covariance, wrong = np.eye(320) / INDEPENDENT, slopes[[0, 1, 3]].reshape(3, -1)
+    covariance += SETTINGS.scene_error**2 * wrong.T @ wrong
+    for second in range(8):
+        own = np.zeros((4, 8, 40))
+        own[:, second] = slopes[:, second] * UNSTEADY * np.array([ERRORS[fault] for fault in faults])[:, None]
+        covariance += own.reshape(4, -1).T @ own.reshape(4, -1)
+    readings = multivariate_normal(np.zeros(320), covariance)
 
     def factor(onset):
         """Return how much more likely the readings are with a softer spring since an onset than without."""
@@ -100,9 +105,9 @@ def test_evidence_is_the_ratio_of_likelihoods_of_gaussian_readings():
 
         def density(size):
             likely = math.exp(readings.logpdf(seen.ravel() - size * change) - readings.logpdf(seen.ravel()))
-            return likely * norm(0.0, SPRING.size).pdf(size) / norm.sf(LEAST[SPRING] / SPRING.size)
+            return likely * norm(0.0, SPRING.size).pdf(size) / norm.sf(0.06 / SPRING.size)
 
-        return quad(density, LEAST[SPRING], 1.0, epsabs=1e-10)[0]
+        return quad(density, 0.06, 1.0, epsabs=1e-10)[0]
 
     assert (found.place, found.onset) == (0, 4 * SECOND) and found.sizes[0] == pytest.approx(0.3, abs=0.1)
     assert found.evidence == pytest.approx(math.log(np.mean([factor(onset) for onset in range(8)])), abs=0.02)
