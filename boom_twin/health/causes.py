@@ -5,11 +5,11 @@ of its filter are linear in these sizes x,
 
     r = sum_i S_i x_i + e,    S_i = (r - r_i) / size_i,
 
-with r_i of the twin with fault i alone. A healthy boom has sizes, too: they are `Settings.scene_error`, all the time. Because no
-model of a moving boom is exact, they are `UNSTEADY` times that besides, anew in each second. A fault is a further size of one
-parameter from its onset on, of unknown amount. So for each onset its most likely size, the variance of that, and the factor by
-which it is more probable than no fault are in closed form (generalised likelihood ratio: A. Willsky and H. Jones, IEEE Trans.
-Automat. Control 21 (1976), 108-112). The evidence of a fault is the mean of that factor over all onsets.
+with r_i of the twin with fault i alone. A healthy boom has sizes, too: they are `Settings.scene_error`, all the time.
+Because no model of a moving boom is exact, they are `UNSTEADY` times that besides, anew in each second. A fault is a further
+size of one parameter from its onset on, of unknown amount. So for each onset its most likely size, the variance of that, and
+the factor by which it is more probable than no fault are in closed form (generalised likelihood ratio: A. Willsky and H. Jones,
+IEEE Trans. Automat. Control 21 (1976), 108-112). The evidence of a fault is the mean of that factor over all onsets.
 
 A sensor whose zero drifts, or a late stream, is no size. Each second gives its twin a gain: its log likelihood less that of the
 boom as believed, and less what errors of the scene explain. Its evidence is the mean over all onsets, too.

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import repeat
 from statistics import NormalDist
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,47 +23,15 @@ from ..deviation.states import Innovations
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, StrokeReading
-from .alarms import UNKNOWN
 from .causes import MEMORY, Evidence, Verdict, likeliest, scores
 from .creep import SPAN, CreepMonitor
-from .faults import Fault, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
+from .faults import Fault, Follower, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
 from .sensor_check import CAME_BACK, Flags
 
 IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
 DELAY = 2  # s from the end of a second to its verdict
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
 WARM_UP = 10  # s of recent samples that new twins take first: they know neither motion nor zeros when they start
-
-
-class Follower(Protocol):
-    """Interface of a twin as far as fault twins need it; see `boom_twin.Twin`."""
-
-    @property
-    def evidence(self) -> float:
-        """Log likelihood of all readings."""
-
-    @property
-    def doubts(self) -> int:
-        """How often the estimate was doubted because its tip was far off the predicted one."""
-
-    @property
-    def requests(self) -> Any:
-        """Requested changes that wait for the next stroke sample."""
-
-    def take(self, block: Any, /) -> object:
-        """Take the samples of a block."""
-
-    def take_innovations(self) -> Innovations:
-        """Return the innovations since the last call."""
-
-    def zeros(self, channels: Collection[str], /) -> tuple[Array, Array, Array]:
-        """Estimated zeros of sensors, their variances, and deviations by errors of the scene."""
-
-    def doubt(self, channels: Collection[str], /) -> None:
-        """Let the zeros of these sensors drift by any amount."""
-
-    def leave_out(self, masked: Flags, strokes: Flags, /) -> None:
-        """Leave out measured channels, and strokes."""
 
 
 class Second(NamedTuple):
@@ -165,7 +133,7 @@ class FaultSearch:
         each = hypothesis(self._scene, faults)
         twin = self._make(each)
         if self._change is not None:
-            twin.requests.repeat(_changed(self._change, each))
+            twin.requests.repeat(each.changed(self._change))
         return each, twin
 
     def close(self) -> None:
@@ -178,7 +146,7 @@ class FaultSearch:
             self._recent.clear()
             self._change = second.change
             for each, twin in zip(self._hypotheses, self._twins, strict=True):
-                twin.requests.repeat(_changed(second.change, each))
+                twin.requests.repeat(each.changed(second.change))
             self._decide_anew()
             return []
         if second.left_out is not None and self._is_newly_left_out(second.left_out):  # its last readings misled all states
@@ -219,9 +187,9 @@ class FaultSearch:
     def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
         """Name the fault of a verdict, change its size, or end it; return its alarm if it begins or ends.
 
-        Far from the boom as believed innovations are not linear in sizes. So all ranked ones are sized by twins, and the one
-        that is likeliest at its own size is named if no other is as likely. Otherwise all are sized again once the evidence
-        has grown by what a name needs.
+        Far from the boom as believed innovations are not linear in sizes. So all ranked ones are sized by twins, and the fault
+        is named if no other is as likely, each at its own size. Otherwise all are sized again once the evidence has grown by
+        what a name needs.
         """
         fault, begin = self._faults[verdict.place], verdict.onset
         if fault in self._named:  # a lag
@@ -232,30 +200,26 @@ class FaultSearch:
         faults = {verdict.place: fault}
         for place, size in verdict.sizes.items() if fault.is_size else ():
             faults[place] = self._faults[place]._replace(size=math.copysign(self._faults[place].size, size))
-        sizes = {place: self._sized(each, begin) for place, each in faults.items()}
-        likely = sorted((each[3], place, each) for place, each in sizes.items() if each is not None)
-        is_tied = any(likely[-1][0] - gain < self._sure for gain, _, _ in likely[:-1])
-        if sizes[verdict.place] is None or is_tied:
+        found = {place: each for place, trial in faults.items() if (each := self._sized(trial, begin)) is not None}
+        likely = {place: each[3] for place, each in found.items()}
+        if verdict.place not in found or any(
+            likely[verdict.place] - each < self._sure for place, each in likely.items() if place != verdict.place
+        ):
             if fault.is_size:
                 self._unsure[verdict.place] = verdict.evidence + self._sure
             else:
                 self._decision.postpone(verdict.place, verdict.evidence)
             return []
-        place, (sized, spread, onset, _) = likely[-1][1:]
+        sized, spread, onset, _ = found[verdict.place]
         if fault.kind == "off" and abs(sized.size) < self._certain * spread:  # its zero still drifts
             return []
         if (before := next((each for each in self._named if each.cause == sized.cause), None)) is not None:
             return self._changed_size(before, sized, spread, onset)
         named = sized.signed()
         evidence = evidence_of(named, spread) if named.is_told else ""
-        chances = dict(verdict.ranked)
-        if fault.is_size:  # those of sizes, by their likelihoods at their own sizes
-            weights = {each[0].cause: math.exp(gain - likely[-1][0]) for gain, _, each in reversed(likely)}
-            share = (1.0 - chances[UNKNOWN]) / sum(weights.values())
-            chances = {cause: share * weight for cause, weight in weights.items()} | {UNKNOWN: chances[UNKNOWN]}
-        causes = tuple(Ranked(cause, chance, ()) for cause, chance in chances.items())
+        causes = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
         alarm = self._named[named] = Alarm(named.channel, named.kind, onset, None, named.cause, evidence, causes)
-        self._believe(named, place + 1)
+        self._believe(named, verdict.place + 1)
         return [alarm] if named.is_told else []
 
     def _may_leak(self, fault: Fault, age: int) -> bool:
@@ -356,9 +320,3 @@ def _feed(twin: Follower, each: Hypothesis, second: Second) -> None:
     if second.left_out is not None:
         twin.leave_out(*second.left_out)
     twin.take(each.in_time(second.block))
-
-
-def _changed(change: Change, each: Hypothesis) -> Change:
-    """Return a change with the load of a hypothesis."""
-    load = each.load(change.settings["payload"], change.settings["line_fill"])
-    return replace(change, settings=change.settings | load)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from ..deviation.kalman import ANGLE_ZERO
 from ..deviation.predictor import LAG_FLOOR
+from ..deviation.states import Innovations
 from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
 from ..scene.summary import explain
-from ..types import SECOND, Alarm, Stream, StrokeReading, channels_of, sensor_kind
+from ..types import SECOND, Alarm, Array, Change, Stream, StrokeReading, channels_of, sensor_kind
 from .alarms import change_text
+from .sensor_check import Flags
 
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
 LATE = 0.02  # s, delay of the stamps of a stream
@@ -75,6 +78,11 @@ class Hypothesis(NamedTuple):
             "line_fill": max(parameter(told, "line_fill") + self.line_fill, 0.0),
         }
 
+    def changed(self, change: Change) -> Change:
+        """Return a change with the load of this boom."""
+        load = self.load(change.settings["payload"], change.settings["line_fill"])
+        return replace(change, settings=change.settings | load)
+
     def in_time(self, block: Any) -> Any:
         """Return a block with stamps corrected by the delays, in the order of time."""
         if not self.delays:
@@ -84,6 +92,37 @@ class Hypothesis(NamedTuple):
             stamps -= round(delay * SECOND) * (block.streams == list(Stream).index(stream))
         order = np.argsort(stamps, kind="stable")
         return block._replace(streams=block.streams[order], stamps=stamps[order], values=block.values[order])
+
+
+class Follower(Protocol):
+    """Interface of a twin as far as fault twins need it; see `boom_twin.Twin`."""
+
+    @property
+    def evidence(self) -> float:
+        """Log likelihood of all readings."""
+
+    @property
+    def doubts(self) -> int:
+        """How often the estimate was doubted because its tip was far off the predicted one."""
+
+    @property
+    def requests(self) -> Any:
+        """Requested changes that wait for the next stroke sample."""
+
+    def take(self, block: Any, /) -> object:
+        """Take the samples of a block."""
+
+    def take_innovations(self) -> Innovations:
+        """Return the innovations since the last call."""
+
+    def zeros(self, channels: Collection[str], /) -> tuple[Array, Array, Array]:
+        """Estimated zeros of sensors, their variances, and deviations by errors of the scene."""
+
+    def doubt(self, channels: Collection[str], /) -> None:
+        """Let the zeros of these sensors drift by any amount."""
+
+    def leave_out(self, masked: Flags, strokes: Flags, /) -> None:
+        """Leave out measured channels, and strokes."""
 
 
 def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
