@@ -223,6 +223,14 @@ def take_innovation(x, covariance, gains, count, innovation, expected, size):
     return 0
 
 
+@inner
+def log_innovation(f, channel, innovation, variance):
+    """Log an innovation of a channel and its variance, unless `LOGGED` wait."""
+    count = f.logged[channel]
+    if count < f.log.shape[1]:
+        f.log[channel, count, 0], f.log[channel, count, 1], f.logged[channel] = innovation, variance, count + 1
+
+
 @kernel
 def take_gains(covariance, gains, count, size):
     """Subtract g g^T of `count` gains g (4, s) from a covariance (s, s), two rows at a time."""

@@ -32,6 +32,7 @@ from .kalman import (
     FAST,
     first_variances,
     gain_after,
+    log_innovation,
     make_transition,
     subtract,
     take_gains,
@@ -210,6 +211,8 @@ def note_innovations(p, f, y):
             mean += f.chances[k] * apart
             square += f.chances[k] * (apart * apart + variance_of(row, f.p[k], f.gain, size))
         f.innovations[i, 0], f.innovations[i, 1] = y[i] - reading - mean, square - mean * mean + drive_noise2(p, f, i)
+        if math.isfinite(y[i]) and not f.deaf[i]:
+            log_innovation(f, i, f.innovations[i, 0], f.innovations[i, 1])
 
 
 @inner

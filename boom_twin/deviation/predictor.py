@@ -32,10 +32,9 @@ from .models import start_models
 from .named_faults import FaultyBoom, NamedFaults
 from .posture import Posture, linearise, new_posture
 from .rest_at_readings import RestFinder
-from .sensor_errors import LAG_FLOOR as LAG_FLOOR
 from .sensor_errors import SensorErrors
 from .sensor_model import mounting_of
-from .states import DOUBTS, FED, PREDICTION, Filters, SensorNoise, drive_place, new_filters
+from .states import DOUBTS, FED, Filters, Innovations, SensorNoise, drive_place, new_filters
 from .tip_estimate import write_predicted_covariance
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
@@ -270,6 +269,12 @@ class BoomPredictor:
     def evidence(self) -> float:
         """Log likelihood of all readings since the twin was made, up to a constant of the session."""
         return float(self.filters.evidence[0])
+
+    def take_innovations(self) -> Innovations:
+        """Return the innovations since the last call, the first `LOGGED` of each channel."""
+        log, counts = self.filters.log.copy(), self.filters.logged.copy()
+        self.filters.logged[:] = 0
+        return Innovations(log[:, :, 0], log[:, :, 1], counts)
 
     @property
     def doubts(self) -> int:

@@ -15,7 +15,7 @@ from .channels import (
     measurement_row,
 )
 from .delayed import delayed_row, note_lateness
-from .kalman import ANGLE_ZERO, correct, gain_after, take_gains, take_innovation
+from .kalman import ANGLE_ZERO, correct, gain_after, log_innovation, take_gains, take_innovation
 from .learning import SURPRISE
 from .mixture import MODELS, mix_means, renew_estimate, weigh_models
 from .rows import SWAY_SHARE, clear, difference, read, variance_of
@@ -195,13 +195,15 @@ def take_reading(p, f, channel, count, residual, variance):
     """
     every = all_states(p)
     variance *= max(f.excess[channel], 1.0)
-    shown, likelihood, ratio, left = 0.0, 0.0, f.ratio[channel], 0
+    shown, likelihood, ratio, left, mean, mean2 = 0.0, 0.0, f.ratio[channel], 0, 0.0, 0.0
     for k in range(ALL_VALVES, ALL_BURST + 1):
         gains = f.gains[k - ALL_VALVES]
         innovation = residual - difference(f.row, f.x[k], f.mean[PREDICTION], every)
         own2 = max(gain_after(f.p[k], f.row, gains, count, every), 0.0)
         expected = variance + own2
         normalised2 = innovation * innovation / expected
+        mean += f.chances[k] * innovation
+        mean2 += f.chances[k] * expected
         shown += f.chances[k] * normalised2
         tail = 1.0 + normalised2 / (DOF * ratio)
         likelihood += f.chances[k] / math.sqrt(ratio * expected * tail ** (DOF + 1.0))
@@ -210,6 +212,7 @@ def take_reading(p, f, channel, count, residual, variance):
         left = take_innovation(f.x[k], f.p[k], gains, count, innovation, expected, every)
         f.likely[k] -= 0.5 * (innovation * innovation / expected + math.log(expected))
     f.evidence[0] += math.log(max(likelihood, 1e-300))
+    log_innovation(f, p.drives.shape[0] + channel, mean, ratio * mean2)
     f.ratio[channel] += LEARN_RATIO * (min(shown, SURPRISE * ratio) - ratio)
     f.excess[channel] = max(f.excess[channel] * (1.0 + LEARN_NOISE * (min(shown, SURPRISE) - 1.0)), 1.0)
     return left

@@ -19,6 +19,7 @@ ALL_VALVES, ALL_OPEN, ALL_BURST = range(3, 6)  # models of the estimate
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
 LOADS = 6  # states of the load at the tip: along x and y its fast part (2), its slow part (2), rates of the fast part (2)
 FED, FED_STAMP, DOUBTS, IS_OLD = range(4)  # of `status`
+LOGGED = 64  # innovations of a channel that are kept: of a second of a fault twin
 DELAYED = 128  # states at most that hold readings of late streams, see `delayed`
 
 
@@ -94,6 +95,8 @@ class Filters(NamedTuple):
     motion: Array  # (sites, 9) predicted x, y, angle (m, rad), their rates, their accelerations
     strokes: Array  # (n, 3) predicted lengths (m), their rates and accelerations
     innovations: Array  # (n, 2) newest lengths less what the prediction's mixture expected before them (m); their variances
+    log: Array  # (n + c, LOGGED, 2) innovations and their variances since the last `BoomPredictor.take_innovations`
+    logged: NDArray[np.int64]  # (n + c,) how many of each channel
     # scratch
     turned: Array
     row: Array
@@ -103,6 +106,17 @@ class Filters(NamedTuple):
     likely: Array
     switch: Array
     shares: Array
+
+
+class Innovations(NamedTuple):
+    """Innovations of each channel, those that drive the model first, and their variances, as the filter expected them.
+
+    values, variances : (n + c, k). counts : (n + c,) how many of each row there are.
+    """
+
+    values: Array
+    variances: Array
+    counts: NDArray[np.int64]
 
 
 def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoise) -> Filters:
@@ -125,7 +139,8 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         row=vectors(states), gain=vectors(states), gains=vectors(4, 4, states), driving=vectors(n, states), offsets=np.zeros(n),
         rows=vectors(9, states), likely=np.zeros(6),
         switch=np.zeros((3, 3)), shares=np.zeros((3, 3)), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),
-        strokes=np.zeros((n, 3)), innovations=np.zeros((n, 2)),
+        strokes=np.zeros((n, 3)), innovations=np.zeros((n, 2)), log=np.zeros((n + channels, LOGGED, 2)),
+        logged=np.zeros(n + channels, np.int64),
     )  # fmt: skip
 
 

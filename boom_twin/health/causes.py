@@ -1,143 +1,99 @@
 """Fault hypotheses of a boom, and the decision which of them is named.
 
-Every second gives each hypothesis a gain: its log likelihood less that of the boom as believed. The evidence of a hypothesis is
-the largest sum of its gains up to now, over all possible onsets.
-A cause is named if its posterior probability is high. Three facts limit that.
+Faults of the boom are sizes of its parameters: losses of stiffness, loads, masses. Near the boom as believed the innovations r
+of its filter are linear in these sizes x,
 
-- Successive innovations are not independent. So likelihoods are raised to the power `TEMPER`.
-- An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. In each second no log
-  likelihood counts as more than `MOST_GAIN` below the best.
-- Parameters of a healthy boom are wrong by `Settings.scene_error`. So its likelihood is that of the boom as believed, and
-  what these errors are expected to cost that. Each fault then seems to have a size. So a name needs a size surely above zero
-  by these errors and by its scatter, for all faults together (bound of Bonferroni).
+    r = sum_i S_i x_i + e,    S_i = (r - r_i) / size_i,
+
+with r_i of the twin with fault i alone. A healthy boom has sizes, too: they are `Settings.scene_error`, all the time.
+Because no model of a moving boom is exact, they are `UNSTEADY` times that besides, anew in each second. A fault is a further
+size of one parameter from its onset on, of unknown amount. So for each onset its most likely size, the variance of that, and
+the factor by which it is more probable than no fault are in closed form (generalised likelihood ratio: A. Willsky and H. Jones,
+IEEE Trans. Automat. Control 21 (1976), 108-112). The evidence of a fault is the mean of that factor over all onsets.
+
+A sensor whose zero drifts, or a late stream, is no size. Each second gives its twin a gain: its log likelihood less that of the
+boom as believed, and less what errors of the scene explain. Its evidence is the mean over all onsets, too.
+
+Two facts limit both. Successive innovations are not independent, so each counts as a share `INDEPENDENT`. And an effect outside
+all hypotheses, such as a valve that opens under a load, may dominate a second: innovations beyond their deviation count less,
+as in the filter, and no log likelihood of a second is so far below the best that it names a fault alone.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from ..config.settings import Settings
-from ..deviation.kalman import ANGLE_ZERO
-from ..deviation.predictor import LAG_FLOOR
-from ..scene.edit import loaded, parameter, parameter_names, with_parameters
+from ..deviation.sensors import DOF
+from ..deviation.states import Innovations
+from ..scene.edit import parameter
 from ..scene.schema import Scene
-from ..scene.summary import explain
-from ..types import Alarm, Array, Stream, StrokeReading, channels_of, sensor_kind
-from .alarms import UNKNOWN, change_text
+from ..types import Array
+from .alarms import UNKNOWN
+from .faults import OIL_LOSS, Fault
 
-LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
-LATE = 0.02  # s, delay of the stamps of a stream
-TEMPER = math.log(20.0) / 25.0  # power of likelihoods: 25 nats more make a cause 20 times as probable
-MOST_GAIN = 12.0  # nats by which the likelihood of a second is below the best, at most
-MEMORY = 60  # s of gains that are kept
-
-
-class Fault(NamedTuple):
-    """Fault of a boom.
-
-    cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off`` or
-    ``late``. size : relative loss, kg, kg/m, s; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis ``off``
-    lets the zero drift by any amount. is_told : False without an alarm: it competes for its effect alone.
-    """
-
-    cause: str
-    kind: str
-    size: float = 0.0
-    is_told: bool = True
-
-    @property
-    def channel(self) -> str:
-        """Channel of its alarm."""
-        return "tip" if self.kind in ("more", "less") else self.cause.partition(".")[0]
-
-
-class Hypothesis(NamedTuple):
-    """Boom with faults.
-
-    scene : with its parameters changed. payload, line_fill : additional load, kg and kg/m. doubted : channels whose zeros may
-    drift by any amount. delays : delay of the stamps of a stream, s.
-    """
-
-    scene: Scene
-    payload: float = 0.0
-    line_fill: float = 0.0
-    doubted: frozenset[str] = frozenset()
-    delays: tuple[tuple[Stream, float], ...] = ()
-
-    def load(self, payload: float, line_fill: float) -> dict[str, float]:
-        """Return the load of this boom from a set load (kg, kg/m; below 0: that of the scene)."""
-        told = loaded(self.scene, payload, line_fill)
-        return {
-            "payload": max(parameter(told, "tip.payload") + self.payload, 0.0),
-            "line_fill": max(parameter(told, "line_fill") + self.line_fill, 0.0),
-        }
-
-
-def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
-    """Return the boom of a scene with these faults."""
-    extra, doubted, delays = {"tip.payload": 0.0, "line_fill": 0.0}, set[str](), list[tuple[Stream, float]]()
-    for cause, kind, size, _ in faults:
-        if kind == "softer":
-            parts = [name for name in parameter_names(scene) if name.endswith(".k")] if cause == "oil.k" else [cause]
-            scene = with_parameters(scene, {name: (1.0 - size) * parameter(scene, name) for name in parts})
-        elif kind == "off":
-            name, channels = cause.removesuffix(".sensor"), channels_of(len(scene.joints))
-            doubted |= set(channels[Stream.IMU]) if name == "tip_imu" else {name}
-        elif kind == "late":
-            delays.append((Stream(cause.removesuffix(".delay")), size))
-        else:
-            extra[cause] += size if kind == "more" else -size
-    return Hypothesis(scene, extra["tip.payload"], extra["line_fill"], frozenset(doubted), tuple(delays))
-
-
-def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
-    """Return all single faults that are compared for a boom; warm oil softens all cylinders and is no fault."""
-    mass = explain(scene).mass
-    found = [Fault(name, "softer", LOSS) for name in parameter_names(scene) if name.endswith((".k", ".EI", ".stiffness"))]
-    found.append(Fault("oil.k", "softer", OIL_LOSS, False))
-    for cause, size in (("tip.payload", LOAD * mass), ("line_fill", 2.0 * LOAD * mass / scene.reach)):
-        found.append(Fault(cause, "more", size))
-        if parameter(scene, cause) > 0.0:
-            found.append(Fault(cause, "less", size))
-    names_of = channels_of(len(scene.joints))
-    angles = () if reads is StrokeReading.ANGLE else names_of[Stream.ANGLES]
-    found += [Fault(f"{name}.sensor", "off") for name in (*angles, "tip_imu", *names_of[Stream.FORCES])]
-    streams = dict.fromkeys((reads.stream, Stream.ANGLES, Stream.IMU, Stream.FORCES))
-    return [*found, *(Fault(f"{stream.value}.delay", "late", LATE) for stream in streams)]
-
-
-def usual_size(scene: Scene, fault: Fault, error: float) -> float:
-    """Return the standard deviation of what looks like a fault in a healthy boom whose parameters are wrong by `error`.
-
-    Independent mass errors of n equal sections turn a straight boom of mass M like a payload of `error` M / sqrt(3 n).
-    """
-    if fault.kind == "softer":
-        return error
-    if fault.kind == "off":  # a part that is wrong turns a joint as its sensor's zero would
-        return ANGLE_ZERO if fault.channel.startswith("joint_") else 0.0
-    if fault.kind == "late":
-        return LAG_FLOOR
-    payload = error * explain(scene).mass / math.sqrt(3.0 * len(scene.sections))
-    return payload if fault.cause == "tip.payload" else 2.0 * payload / scene.reach
+INDEPENDENT = 0.35  # share of successive innovations that count as independent
+UNSTEADY = 3.0  # errors of a second over lasting ones
+MEMORY = 60  # s in which an onset is looked for
+RATIO = 1.4  # of successive trial sizes of a fault
+TINY, NONE = 1e-12, -1e3  # least information; evidence of what cannot be
 
 
 class Verdict(NamedTuple):
-    """Named fault.
+    """Probable fault.
 
-    place : index among the faults compared. rivals : of the other causes that are ranked and have a size; none of a sensor.
-    onset : stamp (ns) of the first second of its evidence. ranked : the three most probable causes with their posterior
-    probabilities, then `UNKNOWN` with the rest.
+    place : index among the faults compared. onset : stamp (ns) of the first second of its evidence. evidence : logarithm of
+    the factor by which it is more probable than no fault. sizes : most likely sizes of all sizes of the boom that are ranked,
+    by their index. ranked : the three most probable causes with their posterior probabilities, then `UNKNOWN` with the rest.
     """
 
     place: int
-    rivals: tuple[int, ...]
     onset: int
+    evidence: float
+    sizes: dict[int, float]
     ranked: tuple[tuple[str, float], ...]
+
+
+class Likeliest(NamedTuple):
+    """Most likely size of a fault.
+
+    spread : standard deviation of the sizes without each second (jackknife), which holds where the model is inexact. onset :
+    number of the first second. probability : log posterior probability density, up to a constant of all faults. half : gain of
+    half the size. The likelihood of a fault rises up to its size; that of a twin that opens another valve may jump.
+    """
+
+    size: float
+    spread: float
+    onset: int
+    probability: float
+    half: float
+
+
+class Scores(NamedTuple):
+    """What the innovations of a second tell of sizes x: their log likelihood is slopes . x - x . information . x / 2."""
+
+    slopes: Array
+    information: Array
+
+
+def scores(believed: Innovations, twins: Sequence[Innovations], sizes: Sequence[float]) -> Scores:
+    """Return the scores of a second from the innovations of the boom as believed, and of twins with faults of these sizes.
+
+    Innovations are weighted as by Student's t in the filter. A channel counts if all twins took as many of its readings.
+    """
+    alike = np.all([each.counts == believed.counts for each in twins], axis=0)
+    taken = (np.arange(believed.values.shape[1]) < believed.counts[:, None]) & alike[:, None]
+    deviations = np.sqrt(believed.variances[taken])
+    changes = np.array([believed.values[taken] - each.values[taken] for each in twins])
+    r, s = believed.values[taken] / deviations, changes / (deviations * np.array(sizes)[:, None])
+    weighted = INDEPENDENT * np.minimum((DOF + 1.0) / (DOF + r * r), 1.0) * s
+    return Scores(weighted @ r, weighted @ s.T)
 
 
 class Evidence:
@@ -149,64 +105,140 @@ class Evidence:
     faults : sequence of Fault
     settings : Settings
         With the posterior probability required to name a cause, and the errors of the scene.
+    errors : sequence of float
+        Sizes that healthy booms seem to have, standard deviation of each.
+    certain : float
+        Smallest size of a fault that is told, over that.
+    named : collection of str
+        Causes of named faults: their sizes may grow or shrink.
     """
 
-    def __init__(self, scene: Scene, faults: Sequence[Fault], settings: Settings) -> None:
-        self._odds, self._faults, none = settings.name_odds, tuple(faults), np.zeros(len(faults))
-        self._wrong = none.copy()  # share of a fault's cost that its usual size has: costs are as squares of sizes
-        for i, fault in enumerate(faults):
-            if (fault.kind == "softer" and fault.is_told) or fault.cause == "tip.payload":  # the others repeat these
-                self._wrong[i] = (usual_size(scene, fault, settings.scene_error) / fault.size) ** 2
-                self._wrong[i] /= [x.cause for x in faults].count(fault.cause)
-        self._gains, self._stamps = deque([none], maxlen=MEMORY), deque([0], maxlen=MEMORY)
+    def __init__(
+        self,
+        scene: Scene,
+        faults: Sequence[Fault],
+        settings: Settings,
+        errors: Sequence[float],
+        certain: float,
+        named: Collection[str] = (),
+    ) -> None:
+        self._odds, self._faults = settings.name_odds, tuple(faults)
+        self._sure = math.log(settings.name_odds / (1.0 - settings.name_odds))
+        self._needed = np.full(len(faults), NONE)  # evidence below which a fault is left out
+        self._is_size = np.array([fault.is_size for fault in faults])
+        sized = [fault for fault in faults if fault.is_size]
+        self._sizes, own = np.array([fault.size for fault in sized]), np.array(errors)[self._is_size]
+        self._least, self._unsteady = certain * own, np.diag((UNSTEADY * own) ** 2)
+        self._is_fault = np.array([fault.kind != "heavier" for fault in sized], bool)
+        self._is_signed = np.array(
+            [fault.cause in named or (fault.kind == "more" and parameter(scene, fault.cause) > 0.0) for fault in sized], bool
+        )
+        self._wrong = np.array([fault.kind != "more" for fault in sized], bool)
+        own = np.where([fault.cause == "oil.k" for fault in sized], OIL_LOSS, own)
+        self._precisions = np.diag(own[self._wrong] ** -2.0)
+        n = len(sized)
+        self._sums = deque([Scores(np.zeros(n), np.zeros((n, n)))], maxlen=MEMORY)
+        self._gains = deque([np.zeros(len(faults) - n)], maxlen=MEMORY)
+        self._stamps = deque([0], maxlen=MEMORY)
 
-    def take(self, stamp: int, likelihoods: Array) -> Verdict | None:
-        """Take the log likelihoods of a second that begins at a stamp (ns); return the verdict if a fault is named.
+    def take(self, stamp: int, likelihoods: Array, found: Scores) -> Verdict | None:
+        """Take a second that begins at a stamp (ns); return the verdict if a fault is probable.
 
-        `likelihoods` (1 + faults,) in nats: the boom as believed first.
+        `likelihoods` (1 + faults,) in nats, the boom as believed first; `found` of the faults that are sizes.
         """
-        believed = likelihoods[0] + self._wrong @ np.maximum(likelihoods[0] - likelihoods[1:], 0.0)
-        likelihoods = np.array([believed, *likelihoods[1:]])
-        bounded = np.maximum(likelihoods, likelihoods.max() - MOST_GAIN)
-        self._gains.append(self._gains[-1] + bounded[1:] - bounded[0])
+        bounded = np.maximum(INDEPENDENT * likelihoods, INDEPENDENT * likelihoods.max() - self._sure)
+        self._gains.append(self._gains[-1] + (bounded[1:] - bounded[0])[~self._is_size])
+        steady = np.linalg.inv(np.eye(len(self._sizes)) + found.information @ self._unsteady)
+        self._sums.append(Scores(*(old + steady @ new for old, new in zip(self._sums[-1], found, strict=True))))
         self._stamps.append(stamp)
-        gains = np.array(self._gains)
-        rises = gains[-1] - gains
-        evidence, onsets = rises.max(axis=0), len(rises) - 1 - rises[::-1].argmax(axis=0)
-        causes = {"": 0.0}  # the healthy boom and each cause are equally probable before
-        for fault, rise in zip(self._faults, evidence.tolist(), strict=True):
-            causes[fault.cause] = max(causes.get(fault.cause, 0.0), rise)
-        weights = np.exp(TEMPER * (np.array(list(causes.values())) - max(causes.values())))
+        sizes, factors, explained = self._sizes_by_onset()
+        every = np.empty((len(factors), len(self._faults)))
+        every[:, self._is_size] = factors
+        every[:, ~self._is_size] = self._gains[-1] - np.array(self._gains)[:-1] - explained[:, None]
+        best, onsets = every.max(axis=0), len(every) - 1 - every[::-1].argmax(axis=0)
+        evidence = best + np.log(np.exp(every - best).mean(axis=0))
+        evidence[evidence < self._needed] = NONE
+        causes = {"": 0.0} | {fault.cause: each for fault, each in zip(self._faults, evidence.tolist(), strict=True)}
+        weights = np.exp(np.array(list(causes.values())) - max(causes.values()))  # all are equally probable before
         chances = dict(zip(causes, (weights / weights.sum()).tolist(), strict=True))
-        best = int(np.argmax(evidence))
-        if chances[self._faults[best].cause] < self._odds:
+        place = int(np.argmax(evidence))
+        if chances[self._faults[place].cause] < self._odds:
             return None
-        shown = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])[:3]
-        shown.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in shown))))
-        others = {cause for cause, _ in shown if self._faults[best].kind != "off"} - {self._faults[best].cause}
-        sized = [i for i, fault in enumerate(self._faults) if fault.cause in others and fault.is_told and fault.kind != "off"]
-        rivals = tuple(i for i in sized if evidence[i] > 0.0)
-        return Verdict(best, rivals, self._stamps[min(int(onsets[best]) + 1, len(self._stamps) - 1)], tuple(shown))
+        ranked = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])[:3]
+        ranked.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in ranked))))
+        shown, likely = {cause for cause, _ in ranked}, np.full(len(self._faults), math.nan)
+        likely[self._is_size] = np.where(self._is_fault, sizes[onsets[self._is_size], np.arange(len(self._sizes))], math.nan)
+        found_sizes = {i: size for i, size in enumerate(likely.tolist()) if size == size and self._faults[i].cause in shown}
+        return Verdict(place, self._stamps[onsets[place] + 1], float(evidence[place]), found_sizes, tuple(ranked))
 
-    def discard(self, place: int) -> None:
-        """Discard the evidence of one fault up to now, because its size is none that is named; others keep theirs."""
-        for gains in self._gains:
-            gains[place] = self._gains[-1][place]
+    def _sizes_by_onset(self) -> tuple[Array, Array, Array]:
+        """Return the likeliest sizes by onset and fault, the logarithms of their factors, and what errors of the scene explain.
+
+        With slopes b and information G since an onset, and errors x of the scene of covariance P, the size of fault j is
+        (b_j - G_j. x) / (G_jj - G_j. P G_.j). One over the denominator is its variance.
+        """
+        slopes, information = (np.array(each) for each in zip(*self._sums, strict=True))
+        b, g, w = slopes[-1] - slopes[:-1], information[-1] - information[:-1], self._wrong
+        covariance = np.linalg.inv(self._precisions + information[-1][np.ix_(w, w)])
+        errors, shared = covariance @ slopes[-1][w], g[:, :, w]
+        explained = np.maximum(b[:, w] @ errors - 0.5 * np.einsum("i,kij,j->k", errors, shared[:, w], errors), 0.0)
+        known = np.einsum("kii->ki", g) - np.einsum("kfi,ij,kfj->kf", shared, covariance, shared)
+        sizes = (b - shared @ errors) / np.maximum(known, TINY)
+        ratio = self._sizes**2 * np.maximum(known, TINY)  # of the variances of a fault's size, before and after
+        factors = 0.5 * (sizes**2 * known * ratio / (1.0 + ratio) - np.log1p(ratio)) + self._above(sizes, ratio)
+        return sizes, np.where(self._is_fault, factors, NONE), explained
+
+    def _above(self, sizes: Array, ratio: Array) -> Array:
+        """Return how much more probable sizes are above the least ones than they were before; logarithm of the factor."""
+        means, deviations = sizes * ratio / (1.0 + ratio), self._sizes / np.sqrt(1.0 + ratio)
+        above, below = log_ndtr((means - self._least) / deviations), log_ndtr((-means - self._least) / deviations)
+        after = np.where(self._is_signed, np.logaddexp(above, below) - math.log(2.0), above)
+        return np.asarray(after - log_ndtr(-self._least / self._sizes))
+
+    def postpone(self, place: int, evidence: float) -> None:
+        """Leave out a sensor or a lag whose size is not sure until its evidence has grown by what a name needs."""
+        self._needed[place] = evidence + self._sure
 
 
-def evidence_of(fault: Fault, spread: float) -> str:
-    """Return size and standard deviation of a fault as figures."""
-    size = -fault.size if fault.kind in ("softer", "less") else fault.size
-    if fault.kind == "softer":
-        return f"{fault.cause.rpartition('.')[2]} {100.0 * size:.0f} % (+- {100.0 * spread:.0f})"
-    if fault.channel == "tip":
-        return change_text(size, "kg" if fault.cause == "tip.payload" else "kg/m", spread)
-    if fault.kind == "late":
-        return change_text(1e3 * size, "ms", 1e3 * spread)
-    return change_text(size, sensor_kind(fault.channel.replace("tip_imu", "tip_imu_x")).unit, spread)
+def likeliest(size: float, least: float, course: Callable[[float], Array]) -> Likeliest | None:
+    """Return the most likely size by twins of larger and smaller sizes, until the likelihood falls on both sides.
 
+    Parameters
+    ----------
+    size : float
+        First trial, and the standard deviation that sizes have before anything is read.
+    least : float
+        Where to end if smaller sizes are ever more likely.
+    course : callable
+        Size -> log likelihood of each second since a possible onset, shape (k,).
 
-def explains(named: Alarm, stream: Stream, deviation: Alarm) -> bool:
-    """Return True if a named fault explains a deviation: a load those of forces, a sensor that of its channel."""
-    is_load = named.kind in ("more", "less") and stream is Stream.FORCES
-    return is_load or (named.channel == deviation.channel and named.kind == "off")
+    Returns
+    -------
+    Likeliest or None
+        None if the smallest trial is the most likely one.
+    """
+    healthy = course(0.0)
+
+    def gained(size: float) -> Array:
+        """Return the gain of a size by onset: the sum of those of the seconds from there."""
+        return np.asarray((course(size) - healthy)[::-1].cumsum()[::-1])
+
+    sizes = [size / RATIO, size]
+    gains = [gained(each) for each in sizes]
+    while gains[-1].max() > gains[-2].max():
+        sizes.append(RATIO * sizes[-1])
+        gains.append(gained(sizes[-1]))
+    while gains[0].max() > gains[1].max() and abs(sizes[0]) > least:
+        sizes.insert(0, sizes[0] / RATIO)
+        gains.insert(0, gained(sizes[0]))
+    best = int(np.argmax([each.max() for each in gains]))
+    if best == 0:
+        return None
+    first, changes = int(gains[best].argmax()), np.array(sizes[best - 1 : best + 2]) - sizes[best]
+    curves, slopes, _ = np.polyfit(changes, [each[first:] for each in gains[best - 1 : best + 2]], 2)
+    change = float(np.clip(-0.5 * slopes[0] / curves[0], changes.min(), changes.max()))
+    with np.errstate(divide="ignore", invalid="ignore"):  # nothing is left without the only second
+        without = 0.5 * np.diff(slopes + 2.0 * curves * change, append=0.0) / (curves[0] + np.diff(curves, append=0.0))
+    found = sizes[best] + change
+    probability = INDEPENDENT * float(gains[best][first]) - 0.5 * (found / size) ** 2
+    return Likeliest(found, float(np.linalg.norm(without)), first, probability, INDEPENDENT * float(gained(0.5 * found)[first]))

@@ -1,64 +1,37 @@
 """Fault twins: one twin for each fault hypothesis, and one of the boom as believed, on the same samples.
 
-The filter of a twin gives the log likelihood of all readings (`BoomPredictor.evidence`). A fault twin has a scene with one
-fault, or lets a sensor's zero drift. `causes` decides by the gains in likelihood. A named fault becomes part of the boom as
-believed. So a second fault, and the end of the first, are named in the same way.
+The filter of a twin gives its innovations and the log likelihood of all readings (`BoomPredictor.evidence`). A fault twin has a
+scene with one fault, or lets a sensor's zero drift. `causes` decides which fault is probable; further twins find its size. A
+named fault becomes part of the boom as believed. So a second fault, and the end of the first, are named in the same way.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import repeat
 from statistics import NormalDist
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..config.settings import Settings
+from ..deviation.states import Innovations
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
-from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
-from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, evidence_of, hypothesis, possible_faults, usual_size
+from ..types import SECOND, Alarm, Array, Change, Ranked, StrokeReading
+from .causes import MEMORY, Evidence, Verdict, likeliest, scores
 from .creep import SPAN, CreepMonitor
+from .faults import Fault, Follower, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
 from .sensor_check import CAME_BACK, Flags
 
-RATIO = 1.4  # of successive trial sizes of a named fault
 IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
 DELAY = 2  # s from the end of a second to its verdict
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
 WARM_UP = 10  # s of recent samples that new twins take first: they know neither motion nor zeros when they start
-
-
-class Follower(Protocol):
-    """Interface of a twin as far as fault twins need it; see `boom_twin.Twin`."""
-
-    @property
-    def evidence(self) -> float:
-        """Log likelihood of all readings."""
-
-    @property
-    def doubts(self) -> int:
-        """How often the estimate was doubted because its tip was far off the predicted one."""
-
-    @property
-    def requests(self) -> Any:
-        """Requested changes that wait for the next stroke sample."""
-
-    def take(self, block: Any, /) -> object:
-        """Take the samples of a block."""
-
-    def zeros(self, channels: Collection[str], /) -> tuple[Array, Array, Array]:
-        """Estimated zeros of sensors, their variances, and deviations by errors of the scene."""
-
-    def doubt(self, channels: Collection[str], /) -> None:
-        """Let the zeros of these sensors drift by any amount."""
-
-    def leave_out(self, masked: Flags, strokes: Flags, /) -> None:
-        """Leave out measured channels, and strokes."""
 
 
 class Second(NamedTuple):
@@ -104,10 +77,13 @@ class FaultSearch:
         self._begin()
 
     def _begin(self) -> None:
-        """Make twins of the boom as believed, without each named fault (except ``off``), and with each other fault."""
+        """Make twins of the boom as believed, without each named lag, and with each other fault.
+
+        A named size of the boom has grown or shrunk in its twin.
+        """
         known = tuple(self._named)
-        causes = {fault.cause for fault in known}
-        fewer = [(fault, tuple(each for each in known if each is not fault)) for fault in known if fault.kind != "off"]
+        causes = {fault.cause for fault in known if not fault.is_size}
+        fewer = [(fault, tuple(each for each in known if each is not fault)) for fault in known if fault.kind == "late"]
         more = [(fault, (*known, fault)) for fault in possible_faults(self._scene, self._reads) if fault.cause not in causes]
         faults, booms = zip((None, known), *fewer, *more, strict=True)
         found = [(fault, *each) for fault, each in zip(faults, self._cores.map(self._warm, booms), strict=True) if each]
@@ -121,6 +97,7 @@ class FaultSearch:
             each, twin = self._made(faults)
             for second in list(self._recent)[-WARM_UP:]:
                 _feed(twin, each, second)
+            twin.take_innovations()
         except BoomTwinError:  # such as one with a part too soft to hold it
             return None
         return each, twin
@@ -145,15 +122,18 @@ class FaultSearch:
 
     def _decide_anew(self) -> None:
         """Discard all evidence of faults."""
-        self._decision, self._age = Evidence(self._scene, self._faults, self._settings), 0
         self._certain = NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - self._settings.name_odds) / len(self._faults))  # Bonferroni
+        errors = [usual_size(self._scene, fault, self._settings.scene_error) for fault in self._faults]
+        named = {fault.cause for fault in self._named}
+        self._decision, self._age = Evidence(self._scene, self._faults, self._settings, errors, self._certain, named), 0
+        self._unsure: dict[int, float] = {}  # evidence of faults below which their sizes are not looked for again
         self._evidence = np.array([twin.evidence for twin in self._twins])
 
     def _made(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower]:
         each = hypothesis(self._scene, faults)
         twin = self._make(each)
         if self._change is not None:
-            twin.requests.repeat(_changed(self._change, each))
+            twin.requests.repeat(each.changed(self._change))
         return each, twin
 
     def close(self) -> None:
@@ -166,7 +146,7 @@ class FaultSearch:
             self._recent.clear()
             self._change = second.change
             for each, twin in zip(self._hypotheses, self._twins, strict=True):
-                twin.requests.repeat(_changed(second.change, each))
+                twin.requests.repeat(each.changed(second.change))
             self._decide_anew()
             return []
         if second.left_out is not None and self._is_newly_left_out(second.left_out):  # its last readings misled all states
@@ -178,18 +158,19 @@ class FaultSearch:
             self._decide_anew()
         doubts = self._twins[0].doubts
         list(self._cores.map(_feed, self._twins, self._hypotheses, repeat(second)))  # waits for all, and raises what one raised
+        innovations = [twin.take_innovations() for twin in self._twins]
         if self._twins[0].doubts > doubts or math.isnan(self._twins[0].evidence):
             self._recent.clear()  # it has half forgotten zeros and load; any other would gain by what it still knows
             self._begin()
             return leaks
-        return [*leaks, *self._decided(second.stamp)]
+        return [*leaks, *self._decided(second.stamp, innovations)]
 
     def _is_newly_left_out(self, flags: tuple[Flags, Flags]) -> bool:
         """Return True if a sensor fails that no recent second leaves out."""
         before = [each.left_out for each in self._recent if each.left_out is not None]
         return bool(before) and any((now & ~np.any(then, axis=0)).any() for now, *then in zip(flags, *before, strict=True))
 
-    def _decided(self, stamp: int) -> list[Alarm]:
+    def _decided(self, stamp: int, innovations: Sequence[Innovations]) -> list[Alarm]:
         """Return the alarms of named faults that begin or end with the evidence of a second."""
         before, self._evidence = self._evidence, np.array([twin.evidence for twin in self._twins])
         grown = self._evidence - before
@@ -199,36 +180,68 @@ class FaultSearch:
             return []
         if (fault := self._back_again()) is not None:
             return self._ended(fault, stamp)
-        verdict = self._decision.take(stamp, grown)
+        sized = [(each, fault.size) for each, fault in zip(innovations[1:], self._faults, strict=True) if fault.is_size]
+        verdict = self._decision.take(stamp, grown, scores(innovations[0], *zip(*sized, strict=True)))
         return [] if verdict is None else self._name(verdict, stamp)
 
     def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
-        """Name the fault of a verdict, or end it if it is named; return its alarm.
+        """Name the fault of a verdict, change its size, or end it; return its alarm if it begins or ends.
 
-        A leaking cylinder also looks softer. So one is named softer only after `SPAN`, in which a leak would show. One whose
-        joint has a sensor that is off is not: that may be its stroke transducer. Rivals have their own most likely sizes.
+        Far from the boom as believed innovations are not linear in sizes. So all ranked ones are sized by twins, and the fault
+        is named if no other is as likely, each at its own size. Otherwise all are sized again once the evidence has grown by
+        what a name needs.
         """
         fault, begin = self._faults[verdict.place], verdict.onset
-        if fault in self._named:
+        if fault in self._named:  # a lag
             return self._ended(fault, begin)
-        if fault.cause.startswith("cylinder_") and fault.kind == "softer":
-            number = int(fault.channel.removeprefix("cylinder_"))
-            is_off = any(each.cause == f"joint_{number}.sensor" for each in self._named)
-            if is_off or number - 1 in self._creep.creeping or stamp - begin < SPAN * SECOND:
-                return []
-        found = self._sized(fault, begin)
-        others = [self._sized(self._faults[each], begin) for each in verdict.rivals if found is not None]
-        if found is None or any(each is not None and TEMPER * (found[3] - each[3]) < self._sure for each in others):
-            self._decision.discard(verdict.place)
+        is_softer = fault.kind == "softer" and verdict.sizes[verdict.place] > 0.0
+        if (is_softer and self._may_leak(fault, stamp - begin)) or verdict.evidence < self._unsure.get(verdict.place, 0.0):
             return []
-        sized, spread, onset, _ = found
+        faults = {verdict.place: fault}
+        for place, size in verdict.sizes.items() if fault.is_size else ():
+            faults[place] = self._faults[place]._replace(size=math.copysign(self._faults[place].size, size))
+        found = {place: each for place, trial in faults.items() if (each := self._sized(trial, begin)) is not None}
+        likely = {place: each[3] for place, each in found.items()}
+        if verdict.place not in found or any(
+            likely[verdict.place] - each < self._sure for place, each in likely.items() if place != verdict.place
+        ):
+            if fault.is_size:
+                self._unsure[verdict.place] = verdict.evidence + self._sure
+            else:
+                self._decision.postpone(verdict.place, verdict.evidence)
+            return []
+        sized, spread, onset, _ = found[verdict.place]
         if fault.kind == "off" and abs(sized.size) < self._certain * spread:  # its zero still drifts
             return []
-        ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
-        evidence = evidence_of(sized, spread) if fault.is_told else ""
-        alarm = self._named[sized] = Alarm(fault.channel, fault.kind, onset, None, fault.cause, evidence, ranked)
-        self._believe(fault, verdict.place + 1)
-        return [alarm] if fault.is_told else []
+        if (before := next((each for each in self._named if each.cause == sized.cause), None)) is not None:
+            return self._changed_size(before, sized, spread, onset)
+        named = sized.signed()
+        evidence = evidence_of(named, spread) if named.is_told else ""
+        part = (named.kind, named.size, spread, named.unit)
+        causes = tuple(Ranked(cause, p, (part,) if cause == named.cause else ()) for cause, p in verdict.ranked)
+        alarm = self._named[named] = Alarm(named.channel, named.kind, onset, None, named.cause, evidence, causes)
+        self._believe(named, verdict.place + 1)
+        return [alarm] if named.is_told else []
+
+    def _may_leak(self, fault: Fault, age: int) -> bool:
+        """Return True if what looks like a softer spring since `age` (ns) may be a leak, or a stroke transducer that is off.
+
+        A leak would show within `SPAN`. A joint's sensor that is off may be that transducer.
+        """
+        if not fault.cause.startswith("cylinder_"):
+            return False
+        number = int(fault.channel.removeprefix("cylinder_"))
+        is_off = any(each.cause == f"joint_{number}.sensor" for each in self._named)
+        return is_off or number - 1 in self._creep.creeping or age < SPAN * SECOND
+
+    def _changed_size(self, named: Fault, change: Fault, spread: float, onset: int) -> list[Alarm]:
+        """Change the size of a named fault; if hardly any is left it has ended: return its alarm."""
+        left = named.changed_by(change)
+        if abs(left.size) < self._certain * math.hypot(spread, usual_size(self._scene, left, self._settings.scene_error)):
+            return self._ended(named, onset)
+        self._named[left] = self._named.pop(named)
+        self._begin()
+        return []
 
     def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
         """End a named fault at a stamp (ns); return its alarm."""
@@ -247,12 +260,10 @@ class FaultSearch:
         return None
 
     def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float, int, float] | None:
-        """Return a fault of the most likely size, its deviation, its onset, not before `onset` (ns), and its gain since then.
+        """Return a fault of the most likely size, its deviation, its onset, not before `onset` (ns), and its log posterior.
 
-        Twins of larger and smaller sizes follow the recent seconds until the likelihood falls on both sides. The deviation is
-        that of the sizes without each second (jackknife), also where the model is inexact. None if the size is not surely above
-        that of healthy booms, if a force's is below the set deviation, or if half the size is not likelier than none: the
-        likelihood of a fault rises up to its size; a twin that opens another valve may jump.
+        None if the size is not surely above that of healthy booms, if half of it is not likelier than none, or if a force's is
+        below the set deviation.
         """
         usual = usual_size(self._scene, fault, self._settings.scene_error)
         if fault.kind == "off":
@@ -261,32 +272,12 @@ class FaultSearch:
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
             is_known = abs(changed.size) > max(least, self._certain * spread)
             return (changed, math.hypot(spread, drift), onset, 0.0) if is_known else None
-        healthy = self._course(fault._replace(size=0.0), onset)
-
-        def gained(size: float) -> Array:
-            """Return the gain of a size by onset: the sum of those of the seconds from there."""
-            gains = self._course(fault._replace(size=size), onset) - healthy
-            return np.asarray(gains[::-1].cumsum()[::-1])
-
-        sizes = [fault.size / RATIO, fault.size]
-        gains = [gained(size) for size in sizes]
-        while gains[-1].max() > gains[-2].max():
-            sizes.append(RATIO * sizes[-1])
-            gains.append(gained(sizes[-1]))
-        while gains[0].max() > gains[1].max() and sizes[0] > self._certain * usual:
-            sizes.insert(0, sizes[0] / RATIO)
-            gains.insert(0, gained(sizes[0]))
-        best = int(np.argmax([each.max() for each in gains]))
-        if best == 0:
+        found = likeliest(fault.size, self._certain * usual, lambda size: self._course(fault._replace(size=size), onset))
+        if found is None:
             return None
-        first, changes = int(gains[best].argmax()), np.array(sizes[best - 1 : best + 2]) - sizes[best]
-        curves, slopes, _ = np.polyfit(changes, [each[first:] for each in gains[best - 1 : best + 2]], 2)
-        change = float(np.clip(-0.5 * slopes[0] / curves[0], changes[0], changes[2]))
-        with np.errstate(divide="ignore", invalid="ignore"):  # nothing is left without the only second
-            without = 0.5 * np.diff(slopes + 2.0 * curves * change, append=0.0) / (curves[0] + np.diff(curves, append=0.0))
-        sized, spread = fault._replace(size=sizes[best] + change), math.hypot(float(np.linalg.norm(without)), usual)
-        is_likely = sized.size > self._certain * spread and TEMPER * gained(0.5 * sized.size)[first] > self._sure
-        return (sized, spread, onset + first * SECOND, float(gains[best][first])) if is_likely else None
+        spread = math.hypot(found.spread, usual)
+        is_known = abs(found.size) > self._certain * spread and found.half > self._sure
+        return (fault._replace(size=found.size), spread, onset + found.onset * SECOND, found.probability) if is_known else None
 
     def _course(self, fault: Fault, onset: int) -> Array:
         """Return the log likelihood of each recent second since the onset; `IMPOSSIBLE` for an impossible boom."""
@@ -329,21 +320,4 @@ class FaultSearch:
 def _feed(twin: Follower, each: Hypothesis, second: Second) -> None:
     if second.left_out is not None:
         twin.leave_out(*second.left_out)
-    twin.take(_in_time(second.block, each))
-
-
-def _in_time(block: Any, each: Hypothesis) -> Any:
-    """Return a block with stamps corrected by the delays of a hypothesis, in the order of time."""
-    if not each.delays:
-        return block
-    stamps = block.stamps.copy()
-    for stream, delay in each.delays:
-        stamps -= round(delay * SECOND) * (block.streams == list(Stream).index(stream))
-    order = np.argsort(stamps, kind="stable")
-    return block._replace(streams=block.streams[order], stamps=stamps[order], values=block.values[order])
-
-
-def _changed(change: Change, each: Hypothesis) -> Change:
-    """Return a change with the load of a hypothesis."""
-    load = each.load(change.settings["payload"], change.settings["line_fill"])
-    return replace(change, settings=change.settings | load)
+    twin.take(each.in_time(second.block))

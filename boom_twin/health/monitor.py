@@ -13,9 +13,9 @@ from ..scene.edit import loaded
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, SENSORS, Alarm, Array, Health, Mount, Place, Stream, StrokeReading
 from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows
-from .causes import Fault, explains, hypothesis
 from .deviations import SIGMAS, DeviationMonitor
 from .fault_twins import FaultTwins
+from .faults import Fault, explains, hypothesis
 from .lag_monitor import LagMonitor
 from .sensor_check import NOISE_OVER, Readings, SensorCheck, StreamReadings, sensor_ranges
 from .sensor_monitor import SensorMonitor

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
 from ..errors import BoomTwinError, SolverError, UsageError
-from ..health.causes import Hypothesis
-from ..health.fault_search import Follower
 from ..health.fault_twins import FaultTwins
+from ..health.faults import Follower, Hypothesis
 from ..health.monitor import HealthMonitor
 from ..kernels.tables import SENTENCES
 from ..scene.edit import loaded

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ..deviation.states import Innovations
 from ..errors import UsageError
 from ..health.monitor import warm_up
 from ..predictions import Clock
@@ -96,6 +97,10 @@ class Twin(SampleTaker):
     def evidence(self) -> float:
         """Log likelihood of all readings, up to a constant that depends on the samples alone."""
         return self._boom.evidence
+
+    def take_innovations(self) -> Innovations:
+        """Return the innovations of all channels since the last call, the first 64 of each."""
+        return self._boom.take_innovations()
 
     @property
     def clocks(self) -> dict[Stream, Clock]:

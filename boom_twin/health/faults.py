@@ -1,0 +1,199 @@
+"""Faults of a boom, the booms that have them, and how they are told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..deviation.kalman import ANGLE_ZERO
+from ..deviation.sensor_errors import LAG_FLOOR
+from ..deviation.states import Innovations
+from ..scene.edit import loaded, parameter, parameter_names, with_parameters
+from ..scene.schema import Scene
+from ..scene.summary import explain
+from ..types import SECOND, Alarm, Array, Change, Stream, StrokeReading, channels_of, sensor_kind
+from .alarms import change_text
+from .sensor_check import Flags
+
+LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
+LATE = 0.02  # s, delay of the stamps of a stream
+
+
+class Fault(NamedTuple):
+    """Fault of a boom.
+
+    cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off``, ``late``, or
+    ``heavier`` of a section. size : relative loss, kg, kg/m, s, relative mass; or the change of a sensor's zero, rad, m/s^2 or
+    N. The hypothesis ``off`` lets the zero drift by any amount. is_told : False without an alarm: it competes for its effect.
+    """
+
+    cause: str
+    kind: str
+    size: float = 0.0
+    is_told: bool = True
+
+    @property
+    def is_size(self) -> bool:
+        """Whether it is the size of a parameter of the boom."""
+        return self.kind not in ("off", "late")
+
+    @property
+    def unit(self) -> str:
+        """Unit of its size; empty of a share."""
+        if self.kind in ("softer", "heavier"):
+            return ""
+        if self.channel == "tip":
+            return "kg" if self.cause == "tip.payload" else "kg/m"
+        return "s" if self.kind == "late" else sensor_kind(self.channel.replace("tip_imu", "tip_imu_x")).unit
+
+    def signed(self) -> Fault:
+        """Return the fault with a size above 0: a negative load is ``less``."""
+        return self._replace(kind="less", size=-self.size) if self.kind == "more" and self.size < 0.0 else self
+
+    def changed_by(self, change: Fault) -> Fault:
+        """Return the fault of both this one and a change of its size."""
+        if self.kind == "softer":
+            return self._replace(size=1.0 - (1.0 - self.size) * (1.0 - change.size))
+        return self._replace(kind="more", size=change.size + (self.size if self.kind == "more" else -self.size)).signed()
+
+    @property
+    def channel(self) -> str:
+        """Channel of its alarm."""
+        return "tip" if self.kind in ("more", "less") else self.cause.partition(".")[0]
+
+
+class Hypothesis(NamedTuple):
+    """Boom with faults.
+
+    scene : with its parameters changed. payload, line_fill : additional load, kg and kg/m. doubted : channels whose zeros may
+    drift by any amount. delays : delay of the stamps of a stream, s.
+    """
+
+    scene: Scene
+    payload: float = 0.0
+    line_fill: float = 0.0
+    doubted: frozenset[str] = frozenset()
+    delays: tuple[tuple[Stream, float], ...] = ()
+
+    def load(self, payload: float, line_fill: float) -> dict[str, float]:
+        """Return the load of this boom from a set load (kg, kg/m; below 0: that of the scene)."""
+        told = loaded(self.scene, payload, line_fill)
+        return {
+            "payload": max(parameter(told, "tip.payload") + self.payload, 0.0),
+            "line_fill": max(parameter(told, "line_fill") + self.line_fill, 0.0),
+        }
+
+    def changed(self, change: Change) -> Change:
+        """Return a change with the load of this boom."""
+        load = self.load(change.settings["payload"], change.settings["line_fill"])
+        return replace(change, settings=change.settings | load)
+
+    def in_time(self, block: Any) -> Any:
+        """Return a block with stamps corrected by the delays, in the order of time."""
+        if not self.delays:
+            return block
+        stamps = block.stamps.copy()
+        for stream, delay in self.delays:
+            stamps -= round(delay * SECOND) * (block.streams == list(Stream).index(stream))
+        order = np.argsort(stamps, kind="stable")
+        return block._replace(streams=block.streams[order], stamps=stamps[order], values=block.values[order])
+
+
+class Follower(Protocol):
+    """Interface of a twin as far as fault twins need it; see `boom_twin.Twin`."""
+
+    @property
+    def evidence(self) -> float:
+        """Log likelihood of all readings."""
+
+    @property
+    def doubts(self) -> int:
+        """How often the estimate was doubted because its tip was far off the predicted one."""
+
+    @property
+    def requests(self) -> Any:
+        """Requested changes that wait for the next stroke sample."""
+
+    def take(self, block: Any, /) -> object:
+        """Take the samples of a block."""
+
+    def take_innovations(self) -> Innovations:
+        """Return the innovations since the last call."""
+
+    def zeros(self, channels: Collection[str], /) -> tuple[Array, Array, Array]:
+        """Estimated zeros of sensors, their variances, and deviations by errors of the scene."""
+
+    def doubt(self, channels: Collection[str], /) -> None:
+        """Let the zeros of these sensors drift by any amount."""
+
+    def leave_out(self, masked: Flags, strokes: Flags, /) -> None:
+        """Leave out measured channels, and strokes."""
+
+
+def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
+    """Return the boom of a scene with these faults."""
+    extra, doubted, delays = {"tip.payload": 0.0, "line_fill": 0.0}, set[str](), list[tuple[Stream, float]]()
+    for cause, kind, size, _ in faults:
+        if kind == "softer":
+            parts = [name for name in parameter_names(scene) if name.endswith(".k")] if cause == "oil.k" else [cause]
+            scene = with_parameters(scene, {name: (1.0 - size) * parameter(scene, name) for name in parts})
+        elif kind == "heavier":
+            scene = with_parameters(scene, {cause: (1.0 + size) * parameter(scene, cause)})
+        elif kind == "off":
+            name, channels = cause.removesuffix(".sensor"), channels_of(len(scene.joints))
+            doubted |= set(channels[Stream.IMU]) if name == "tip_imu" else {name}
+        elif kind == "late":
+            delays.append((Stream(cause.removesuffix(".delay")), size))
+        else:
+            extra[cause] += size if kind == "more" else -size
+    return Hypothesis(scene, extra["tip.payload"], extra["line_fill"], frozenset(doubted), tuple(delays))
+
+
+def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
+    """Return all single faults that are compared for a boom; warm oil, which softens all cylinders, and masses are none."""
+    mass = explain(scene).mass
+    found = [Fault(name, "softer", LOSS) for name in parameter_names(scene) if name.endswith((".k", ".EI", ".stiffness"))]
+    found.append(Fault("oil.k", "softer", OIL_LOSS, False))
+    found += [Fault(f"section_{i + 1}.mass", "heavier", LOSS, False) for i in range(len(scene.sections))]
+    found.append(Fault("tip.payload", "more", LOAD * mass))
+    found.append(Fault("line_fill", "more", 2.0 * LOAD * mass / scene.reach))
+    names_of = channels_of(len(scene.joints))
+    angles = () if reads is StrokeReading.ANGLE else names_of[Stream.ANGLES]
+    found += [Fault(f"{name}.sensor", "off") for name in (*angles, "tip_imu", *names_of[Stream.FORCES])]
+    streams = dict.fromkeys((reads.stream, Stream.ANGLES, Stream.IMU, Stream.FORCES))
+    return [*found, *(Fault(f"{stream.value}.delay", "late", LATE) for stream in streams)]
+
+
+def usual_size(scene: Scene, fault: Fault, error: float) -> float:
+    """Return the standard deviation of what looks like a fault in a healthy boom whose parameters are wrong by `error`.
+
+    Independent mass errors of n equal sections turn a straight boom of mass M like a payload of `error` M / sqrt(3 n).
+    """
+    if fault.kind in ("softer", "heavier"):
+        return error
+    if fault.kind == "off":  # a part that is wrong turns a joint as its sensor's zero would
+        return ANGLE_ZERO if fault.channel.startswith("joint_") else 0.0
+    if fault.kind == "late":
+        return LAG_FLOOR
+    payload = error * explain(scene).mass / math.sqrt(3.0 * len(scene.sections))
+    return payload if fault.cause == "tip.payload" else 2.0 * payload / scene.reach
+
+
+def evidence_of(fault: Fault, spread: float) -> str:
+    """Return size and standard deviation of a fault as figures."""
+    size = -fault.size if fault.kind in ("softer", "less") else fault.size
+    if fault.kind == "softer":
+        return f"{fault.cause.rpartition('.')[2]} {100.0 * size:.0f} % (+- {100.0 * spread:.0f})"
+    if fault.kind == "late":
+        return change_text(1e3 * size, "ms", 1e3 * spread)
+    return change_text(size, fault.unit, spread)
+
+
+def explains(named: Alarm, stream: Stream, deviation: Alarm) -> bool:
+    """Return True if a named fault explains a deviation: a load those of forces, a sensor that of its channel."""
+    is_load = named.kind in ("more", "less") and stream is Stream.FORCES
+    return is_load or (named.channel == deviation.channel and named.kind == "off")
