@@ -305,7 +305,7 @@ class Health:
     """Health of the rig at one stamp (ns)."""
 
     stamp: int
-    """End of the newest block of residuals that was evaluated."""
+    """Stamp of the strokes, or driving angles, with which the newest block of residuals was complete."""
     alarms: tuple[Alarm, ...]
     """Active alarms, and those that have ended since the last `Health`."""
     tip_sigmas: Array

@@ -153,7 +153,7 @@ class HealthMonitor:
             for stream in MEASURED_NOISE
             if stream in self._checks
         }
-        return Health(self._told, tuple(alarms), tip_sigmas(), noise)
+        return Health(stamp, tuple(alarms), tip_sigmas(), noise)
 
     @property
     def _named(self) -> list[Alarm]:

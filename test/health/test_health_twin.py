@@ -38,6 +38,11 @@ def first_after(outcome: Outcome, onset: float) -> float:
     return told[0][0] - onset
 
 
+def test_health_has_the_stamps_of_strokes():
+    strokes = {sample.stamp for sample in session() if sample.stream is Stream.STROKES}
+    assert len(healthy().health) >= 12 and {health.stamp for health in healthy().health} <= strokes
+
+
 @pytest.mark.parametrize("kind, channel", [("stuck", 0), ("dropout", 1), ("spikes", 2), ("noise", 3)])
 def test_an_angle_sensor(kind, channel):
     """Found within a second, that sensor named and no other; what the twin predicts is the same, bit for bit."""
