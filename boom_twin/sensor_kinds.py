@@ -86,7 +86,7 @@ def imu_kind(stem: str, lack: str = "") -> SensorKind:
         field="linear_acceleration",
         axes=("x", "z"),
         is_placed=not lack,
-        alarms=("stuck",),
+        alarms=("stuck", "dropout"),
     )
 
 

@@ -133,7 +133,7 @@ SENSORS[Stream.MOMENTS] = SensorKind(
     field="effort",
     is_placed=True,
     shown="kN m",
-    alarms=("stuck",),
+    alarms=("stuck", "dropout"),
 )
 for _point in (Stream.POINT, Stream.POINT_2):
     SENSORS[_point] = SensorKind(

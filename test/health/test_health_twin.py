@@ -43,6 +43,13 @@ def test_health_has_the_stamps_of_strokes():
     assert len(healthy().health) >= 12 and {health.stamp for health in healthy().health} <= strokes
 
 
+def test_an_imu_that_falls_silent():
+    first = session()[0].stamp
+    heard = [each for each in session() if each.stream is not Stream.IMU or not 5.0 < (each.stamp - first) * NANO < 8.0]
+    ((time, channel, kind, cause),) = run(heard).told()
+    assert 5.5 <= time < 6.0 and (channel, kind, cause) == ("tip_imu", "dropout", "tip_imu.sensor")
+
+
 @pytest.mark.parametrize("kind, channel", [("stuck", 0), ("dropout", 1), ("spikes", 2), ("noise", 3)])
 def test_an_angle_sensor(kind, channel):
     """Found within a second, that sensor named and no other; what the twin predicts is the same, bit for bit."""
