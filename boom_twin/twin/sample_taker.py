@@ -89,7 +89,7 @@ class SampleTaker:
         self.absent |= {name for name in self._channels[Stream.MOMENTS] if name not in self.places}
         self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
         self._widths = [len(names) for names in self._channels.values()]
-        self._edge = SampleCheck(self._channels, self._drive, is_sure=is_follower)
+        self._edge = SampleCheck(self._channels, self._drive)
         self.requests = Requests(self.settings)
         self._doubted, self._is_follower = frozenset(doubted), is_follower
         self._room = FOLLOWER_ROOM if is_follower else ROOM

@@ -278,11 +278,8 @@ class Twin(SampleTaker):
         block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
         row, size, drive, self._judged = 0, len(block.stamps), CODES[self._drive], True
         while row < size:
-            is_sure = self._run is not None and self._edge.is_sure and not self.requests.due
-            end = row + (self._room.samples if is_sure else 1)
+            end = row + (self._room.samples if self._run is not None and not self.requests.due else 1)
             stamp, is_drive = int(block.stamps[row]), block.streams[row] == drive
-            if is_drive:
-                self._edge.look(stamp)
             if self._fault_twins is not None:  # they take a second before its verdict may be asked for
                 self._fault_twins.reach(stamp, self._failing)
                 is_later = block.stamps[row:end] // SECOND != stamp // SECOND
