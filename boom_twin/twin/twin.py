@@ -242,7 +242,7 @@ class Twin(SampleTaker):
         """Take a sample that the compiled update did not take; tell the fault twins."""
         rows = self._fail(sample, []) if reason == FAILED else self._look_at(sample)
         if self._fault_twins is not None:
-            if (change := rows.notes.get(len(rows.stamps) - 1, REGULAR).change) is not None:
+            if (change := rows.notes.get(0, REGULAR).change) is not None:
                 self._fault_twins.change(change)
             channels = b"" if self._is_complete(sample) else np.isfinite(sample.values).tobytes()
             self._fault_twins.take(block_of([sample], self.plan.joints), channels)
@@ -268,11 +268,6 @@ class Twin(SampleTaker):
         -------
         ReportBlock
             Reports of the samples in their order.
-
-        Raises
-        ------
-        UsageError
-            As `update` does; the samples before have been taken.
         """
         found: list[ReportBlock] = []
         block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
