@@ -12,10 +12,9 @@ from ..errors import BoomTwinError, Fault, SceneError, UsageError
 from ..scene import Scene
 from ..scene.kinematics import strokes_of_posture
 from ..scene.load import DEFAULT_NAME, examine
-from ..scene.oil_spring import STATIONS
 from ..scene.schema import Base, Clearance
 from ..scene.segmentation import LEAST_PARTS
-from ..scene.summary import UNKNOWNS_BASE, UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
+from ..scene.summary import STATIONS, UNKNOWNS_BASE, UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..system.atomic_files import check_target
 from ..types import Place, Stream, StrokeReading
 from . import reduce as need

@@ -18,7 +18,6 @@ from ..kernels.elements import pin_contact as contact
 from ..kernels.elements.linkage import LINK_L, LINK_R
 from ..kernels.tables import Tables
 from ..scene.kinematics import gravity_in_base, linkage
-from ..scene.oil_spring import oil_record
 from ..scene.schema import Cylinder, Pin, RigidPart, Scene
 from ..scene.segmentation import SAME_PLACE, CylinderPin, cylinder_pins, flexible_parts, splits
 from ..types import Array
@@ -137,7 +136,7 @@ class _Builder:
             if own is not None and (own.mass or own.inertia):
                 history = self._point(own.mass, own.inertia)
                 self.layout.add("parts", end=end, history=history, com=own.com, mass=own.mass, inertia=own.inertia)
-        oil = -1 if part.oil is None else self.layout.add("oils", **_fields(oil_record(part)))
+        oil = -1 if part.oil is None else self.layout.add("oils", **part.oil_row)
         self.layout.add(
             "cylinders",
             z=z,

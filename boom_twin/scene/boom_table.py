@@ -101,22 +101,15 @@ def read_table(path: Path) -> tuple[BoomTable, Document]:
 
 
 def _faults(document: Document, table: BoomTable) -> list[Fault]:
-    """Return faults: walls that fill their box, rods as thick as the bore, no density, not a joint for every section."""
+    """Return faults that the scene does not show: walls that fill their box, no density, pipes or angles that say nothing."""
     found = []
     for i, section in enumerate(table.sections):
         if 2.0 * section.wall >= min(section.height, section.width):
             bound = f"two walls fill the box of {section.height:g} by {section.width:g} m"
             found.append(document.fault(("sections", i, "wall"), section.wall, bound, "Give the thickness of one wall."))
-    for i, joint in enumerate(table.joints):
-        if joint.rod >= joint.bore:
-            bound = f"the rod must be thinner than the bore, {joint.bore:g} m"
-            found.append(document.fault(("joints", i, "rod"), joint.rod, bound, "Give both as diameters."))
     if table.material.rho is None:
         remedy = f"Give {meaning_of(Material, 'rho')}."
         found.append(document.fault(("material", "rho"), ABSENT, "masses are worked out with it", remedy))
-    if len(table.joints) != len(table.sections):
-        bound = f"there are {len(table.sections)} sections, and every section has one joint"
-        found.append(document.fault(("joints",), len(table.joints), bound, "Add or remove joints or sections."))
     return [*found, *_pipes_of_some(document, table), *_angle_without_unit(document)]
 
 

@@ -22,7 +22,6 @@ from ..config.yaml_text import Place, with_values, words, yaml_text
 from ..errors import SceneError, UsageError
 from .block_reader import validated
 from .load import examine_text, parse, text_of
-from .oil_spring import middle_stiffness
 from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
 
 Body = TypeVar("Body", RigidPart, CylinderPart)
@@ -46,7 +45,7 @@ def parameter(scene: Scene, name: str) -> float:
     """Return the value of one parameter, SI; UsageError if the scene has none of that name."""
     part, key = _owner(scene, name)
     if isinstance(part, Cylinder) and key == "k":
-        return middle_stiffness(part)
+        return part.middle_stiffness
     if isinstance(part, Section) and key == "EI":
         return scene.material.E * (part.I or 0.0)
     return part.mass if isinstance(part, Section) and key == "mass" else float(getattr(part, key) or 0.0)
@@ -74,7 +73,7 @@ def _with_one(scene: Scene, name: str, value: float) -> Scene:
         raise UsageError(f"{name} = {value:g}: must be finite{bound}.")
     changes: dict[str, Any] = {key: value}
     if isinstance(part, Cylinder) and key == "k" and (oil := part.oil) is not None:
-        modulus = oil.bulk_modulus * value / middle_stiffness(part)
+        modulus = oil.bulk_modulus * value / part.middle_stiffness
         changes = {"oil": oil.model_copy(update={"bulk_modulus": modulus})}
     elif isinstance(part, Section) and key == "EI":
         changes = {"I": value / scene.material.E}

@@ -22,7 +22,6 @@ from .checks.sizes import TURNS
 from .checks.whole_boom import straight_boom
 from .kinematics import RANGE_SAMPLES, joint_curve, linkage_of, stroke_curve
 from .load import examine_text, with_end_mark
-from .oil_spring import middle_stiffness, stiffness
 from .schema import Cylinder, JointGeometry, Oil, Scene, Section
 
 TUBE = 0.12  # wall of a barrel over its bore
@@ -67,7 +66,7 @@ def _straight_stiffnesses(scene: Scene) -> Array:
     """Return the stiffness (N/m) of every cylinder, shape (n,), where its joint is straight, or next to it."""
     angles = [np.radians([np.clip(0.0, *joint.range_deg)]) for joint in scene.joints]
     strokes = [float(stroke_curve(scene, i, angle)[0]) for i, angle in enumerate(angles)]
-    return np.array([stiffness(joint.cylinder, stroke) for joint, stroke in zip(scene.joints, strokes, strict=True)])
+    return np.array([joint.cylinder.stiffness(stroke) for joint, stroke in zip(scene.joints, strokes, strict=True)])
 
 
 def _text(table: BoomTable, source: str, first: float | None) -> str:
@@ -141,7 +140,7 @@ def _cylinder(table: BoomTable, joint: DrawnJoint, first: float | None) -> list[
     rho = table.material.rho or 0.0
     values = joint.model_dump(include={"bore", "rod", "cap_line", "rod_line"})
     oil = Oil(bulk_modulus=table.bulk_modulus, **values)
-    k = middle_stiffness(Cylinder(closed_length=closed, max_stroke=stroke, oil=oil))
+    k = Cylinder(closed_length=closed, max_stroke=stroke, oil=oil).middle_stiffness
     rows: list[Row] = [
         ("oil", oil.model_dump(), ""),
         ("", "", "k(s) = B [Ac^2/(Vc + Ac s) + Ar^2/(Vr + Ar (max_stroke - s))], B bulk_modulus, Vc cap_line, Vr rod_line"),

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ..kernels.elements.cylinder import oil_compliance
 from ..kernels.elements.pin_contact import LAWS, restitution_of
 from ..system.result_text import SummaryDisplay, numbers
 
@@ -175,6 +177,28 @@ class Cylinder(Part):
     def is_compressible(self) -> bool:
         """Return True if the cylinder has an oil spring."""
         return self.k is not None or self.oil is not None
+
+    @property
+    def oil_row(self) -> dict[str, float]:
+        """Fields of `boom_twin.kernels.elements.cylinder.OIL` for a cylinder with `oil`."""
+        values = ("bulk_modulus", "cap_area", "rod_area", "cap_line", "rod_line")
+        return {key: getattr(self.oil, key) for key in values} | {"max_stroke": self.max_stroke, "damping": self.d or 0.0}
+
+    def stiffness(self, stroke: float) -> float:
+        """Return k (N/m) at a stroke of the drive (m): the given number, that of the oil, or infinity.
+
+        k(s) = B (A_c^2 / (V_c + A_c s) + A_r^2 / (V_r + A_r (s_max - s))): bulk modulus B, areas A and oil V at stroke 0 or
+        s_max of cap side and rod side.
+        """
+        if self.oil is None:
+            return math.inf if self.k is None else self.k
+        compliance = float(oil_compliance(SimpleNamespace(**self.oil_row), stroke))
+        return 1.0 / compliance if compliance else math.inf
+
+    @property
+    def middle_stiffness(self) -> float:
+        """k in the middle of the stroke, N/m."""
+        return self.stiffness(0.5 * self.max_stroke)
 
 
 BEFORE = "the outboard pivot of the section before"

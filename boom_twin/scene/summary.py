@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .kinematics import RANGE_SAMPLES, joint_curve, linkage, stroke_range
-from .oil_spring import STATIONS, stiffness
 from .schema import IDEAL_BELOW, Joint, Pin, Scene, Section
 from .segmentation import CylinderPin, flexible_parts, splits
+
+STATIONS = (0.0, 0.25, 0.5, 0.75, 1.0)  # shares of the full stroke at which k is told
 
 
 def left_out(scene: Scene) -> dict[str, str]:
@@ -112,7 +113,7 @@ class JointAccount:
 
     ``stroke_low``, ``stroke_high`` (m) are reached over ``range_deg`` where links close and the cylinder reaches. ``lever`` is
     the least and the greatest ds/dphi (m) over it, ``transmission_deg`` the least angle between the links, None for kind A.
-    ``k_over_stroke`` (N/m) is at `boom_twin.scene.oil_spring.STATIONS` for a cylinder with oil, else empty.
+    ``k_over_stroke`` (N/m) is at `STATIONS` for a cylinder with oil, else empty.
     """
 
     number: int
@@ -188,7 +189,7 @@ def _section(scene: Scene, i: int) -> SectionAccount:
 def _joint(scene: Scene, i: int) -> JointAccount:
     joint, cylinder = scene.joints[i], scene.joints[i].cylinder
     low, high = stroke_range(scene, i, RANGE_SAMPLES)
-    oil = () if cylinder.oil is None else tuple(stiffness(cylinder, share * cylinder.max_stroke) for share in STATIONS)
+    oil = () if cylinder.oil is None else tuple(cylinder.stiffness(share * cylinder.max_stroke) for share in STATIONS)
     _, levers, between = joint_curve(linkage(scene, i), np.radians(np.linspace(*joint.range_deg, RANGE_SAMPLES)))
     lever = float(np.nanmin(levers)), float(np.nanmax(levers))
     return JointAccount(i + 1, joint, low, high, oil, lever, float(np.nanmin(between)) if i else None)

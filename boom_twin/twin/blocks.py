@@ -5,7 +5,7 @@ The order of the rows is the order in which the samples were taken. Stamps are i
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,11 +161,6 @@ class ReportBlock(NamedTuple):
     residuals: ResidualBlock
     health: dict[int, Health]  # by row of the sample
     notes: dict[int, Note]  # by row of the sample, in their order; none of a regular sample
-
-    def noted(self, **changes: Any) -> ReportBlock:
-        """Return this block with other fields of the last sample's note."""
-        last = len(self.stamps) - 1
-        return self._replace(notes={**self.notes, last: self.notes.get(last, REGULAR)._replace(**changes)})
 
     def reports(self, joints: int) -> list[Report]:
         """Return one report for every sample, of a boom with so many joints."""

@@ -23,15 +23,15 @@ LARGEST_STAMP = 2**63  # ns
 class SampleCheck:
     """Check of samples before the twin takes them.
 
-    `drive` is the stream that drives the model. If `is_sure`, its stamps are known to be nanoseconds.
+    `drive` is the stream that drives the model. Its first stamps show if they are nanoseconds.
     """
 
-    def __init__(self, channels: Mapping[Stream, tuple[str, ...]], drive: Stream, is_sure: bool = False) -> None:
+    def __init__(self, channels: Mapping[Stream, tuple[str, ...]], drive: Stream) -> None:
         self._drive = drive
         self._shapes = {stream: (len(names),) for stream, names in channels.items()}
         self._names = {stream: f"{names[0]}..{names[-1]}" for stream, names in channels.items() if names}
         self._count, self._low, self._high = 0, LARGEST_STAMP, -LARGEST_STAMP
-        self.is_sure = is_sure
+        self._is_sure = False
 
     def checked(self, sample: Sample) -> Sample:
         """Return the sample with an int stamp and contiguous float64 values (channels,); UsageError as of `Twin.update`."""
@@ -53,23 +53,18 @@ class SampleCheck:
         else:
             stream = _stream(stream)
             found = Sample(stream, _stamp(stamp), self._values(stream, values))
-        if stream is self._drive:
-            self.look(found.stamp)
+        if stream is self._drive and not self._is_sure:
+            self._look(found.stamp)
         return found
 
-    def look(self, stamp: int) -> None:
-        """Raise UsageError if the stamps are too close together to be nanoseconds.
-
-        Stamps that have passed once are not checked again; a single repeated stamp decides nothing.
-        """
-        if self.is_sure:
-            return
+    def _look(self, stamp: int) -> None:
+        """Raise UsageError if the first `DECIDING` different stamps are too close together to be nanoseconds."""
         self._count += 1
         self._low, self._high = min(self._low, stamp), max(self._high, stamp)
         if self._count < DECIDING or self._low == self._high:
             return
-        self.is_sure = self._high - self._low >= self._count * SHORTEST_STEP
-        if not self.is_sure:
+        self._is_sure = self._high - self._low >= self._count * SHORTEST_STEP
+        if not self._is_sure:
             first, last, count, self._count = self._low, self._high, self._count, 0
             raise UsageError(
                 f"stamps of {count} strokes go from {first} to {last}: less than {SHORTEST_STEP} ns from one to the next. "

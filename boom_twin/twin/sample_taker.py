@@ -88,7 +88,7 @@ class SampleTaker:
         self.absent |= {name for name in self._channels[Stream.MOMENTS] if name not in self.places}
         self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
         self._widths = [len(names) for names in self._channels.values()]
-        self._edge = SampleCheck(self._channels, self._drive, is_sure=is_follower)
+        self._edge = SampleCheck(self._channels, self._drive)
         self.requests = Requests(self.settings)
         self._doubted, self._is_follower = frozenset(doubted), is_follower
         self._room = FOLLOWER_ROOM if is_follower else ROOM
@@ -250,11 +250,12 @@ class SampleTaker:
             report, from_rest = self._start(sample, events), True
         else:
             return self._refuse(sample, "waiting", *events)
-        has_begun = from_rest and report.notes.get(0, REGULAR).accepted
+        note = report.notes.get(0, REGULAR)
+        has_begun = from_rest and note.accepted
         if asked or has_begun:
-            is_new = from_rest and self._is_new
+            change = Change(sample.stamp, from_rest, self.settings.live, self._zeros.values, from_rest and self._is_new)
             self._is_new &= not has_begun
-            return report.noted(change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values, is_new))
+            return report._replace(notes={0: note._replace(change=change)})
         return report
 
     def _start(self, sample: Sample, events: list[str]) -> ReportBlock:

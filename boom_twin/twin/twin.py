@@ -247,7 +247,7 @@ class Twin(SampleTaker):
         """Take a sample that the compiled update did not take; tell the fault twins."""
         rows = self._fail(sample, []) if reason == FAILED else self._look_at(sample)
         if self._fault_twins is not None:
-            if (change := rows.notes.get(len(rows.stamps) - 1, REGULAR).change) is not None:
+            if (change := rows.notes.get(0, REGULAR).change) is not None:
                 self._fault_twins.change(change)
             channels = b"" if self._is_complete(sample) else np.isfinite(sample.values).tobytes()
             self._fault_twins.take(block_of([sample], self.plan.joints), channels)
@@ -273,21 +273,13 @@ class Twin(SampleTaker):
         -------
         ReportBlock
             Reports of the samples in their order.
-
-        Raises
-        ------
-        UsageError
-            As `update` does; the samples before have been taken.
         """
         found: list[ReportBlock] = []
         block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
         row, size, drive, self._judged = 0, len(block.stamps), CODES[self._drive], True
         while row < size:
-            is_sure = self._run is not None and self._edge.is_sure and not self.requests.due
-            end = row + (self._room.samples if is_sure else 1)
+            end = row + (self._room.samples if self._run is not None and not self.requests.due else 1)
             stamp, is_drive = int(block.stamps[row]), block.streams[row] == drive
-            if is_drive:
-                self._edge.look(stamp)
             if self._fault_twins is not None:  # they take a second before its verdict may be asked for
                 self._fault_twins.reach(stamp, self._failing)
                 is_later = block.stamps[row:end] // SECOND != stamp // SECOND

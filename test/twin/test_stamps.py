@@ -65,10 +65,9 @@ def tips(twin, samples):
     return {p.stamp: p.tip_position for p in every if p is not None}
 
 
-def misses(clean, found, first, last, shift=0):
+def misses(clean, found, first, last):
     """Distance (m) of tips from the clean ones, by number of the sample."""
-    stamps = {p.stamp + shift: p.tip_position for p in clean[0][first:last]}
-    return [float(np.hypot(*(found[stamp] - tip))) for stamp, tip in stamps.items() if stamp in found]
+    return [float(np.hypot(*(found[p.stamp] - p.tip_position))) for p in clean[0][first:last] if p.stamp in found]
 
 
 @pytest.mark.parametrize("at", [AT, 700, 1000])

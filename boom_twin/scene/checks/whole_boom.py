@@ -20,7 +20,6 @@ from ...errors import Fault
 from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
 from ..kinematics import linkage
-from ..oil_spring import middle_stiffness
 from ..schema import Scene
 from . import Draft, Findings
 
@@ -44,7 +43,7 @@ def whole_boom(draft: Draft, odd: Sequence[str]) -> list[Fault]:
     if any(path.rpartition(".")[2] in TAKES for path in odd):
         return []
     scene = draft.scene
-    found = straight_boom(scene, np.array([middle_stiffness(joint.cylinder) for joint in scene.joints]))
+    found = straight_boom(scene, np.array([joint.cylinder.middle_stiffness for joint in scene.joints]))
     checks = (_payload, _pressure, _give, _stiff, _frequency, _damping)
     turned = [path.removesuffix("range_deg") for path in odd if path.endswith("range_deg")]  # joints whose levers are no use
     findings = ([each for each in check(draft, scene, found) if not each.path.startswith(tuple(turned))] for check in checks)
@@ -72,7 +71,7 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
         if section.beta:
             parts.append((("sections", i, "beta"), section.beta, section.beta))
         if joint.cylinder.d:
-            delay = joint.cylinder.d / middle_stiffness(joint.cylinder)
+            delay = joint.cylinder.d / joint.cylinder.middle_stiffness
             parts.append((("joints", i, "cylinder", "d"), joint.cylinder.d, delay))
     if scene.base.damping and scene.base.stiffness:
         parts.append((("base", "damping"), scene.base.damping, scene.base.damping / scene.base.stiffness))
@@ -106,7 +105,7 @@ def _pressure(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
 def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
     give = 0.02  # of the stroke, by which the oil gives way under the weight of the boom
     for i, joint in enumerate(scene.joints):
-        k, lever = middle_stiffness(joint.cylinder), abs(float(found.levers[i]))
+        k, lever = joint.cylinder.middle_stiffness, abs(float(found.levers[i]))
         if math.isfinite(k) and lever > 0.0:
             force, most = float(found.moments[i]) / lever, give * joint.cylinder.max_stroke
             if force > k * most:

@@ -19,7 +19,6 @@ from ...kernels.elements.linkage import cylinder_length
 from ...reduction import search
 from ...scene.edit import scaled, with_rigid_cylinders
 from ...scene.kinematics import linkage_of
-from ...scene.oil_spring import middle_stiffness
 from ...scene.schema import Base, Cylinder, Joint, Scene, Section, Tip
 from ...scene.summary import mass_of
 from ...types import Array
@@ -37,7 +36,7 @@ def cylinders(scene: Scene, stiffness: float | None) -> Scene:
         return with_rigid_cylinders(scene)
 
     def changed(cylinder: Cylinder) -> Cylinder:
-        lag = (cylinder.d or 0.0) / middle_stiffness(cylinder) if cylinder.is_compressible else 3e-3  # s
+        lag = (cylinder.d or 0.0) / cylinder.middle_stiffness if cylinder.is_compressible else 3e-3  # s
         return cylinder.model_copy(update={"k": stiffness, "oil": None, "d": lag * stiffness})
 
     return _with_cylinders(scene, changed)
