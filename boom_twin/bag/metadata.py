@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from io import StringIO
 from pathlib import Path, PureWindowsPath
 from typing import Any
@@ -205,7 +204,7 @@ class Recorded:
     @classmethod
     def offered(cls, topic: str, type_name: str, definition: str, qos: Qos, type_hash: str) -> Recorded:
         """Return a topic offered with `qos`. Its channel keeps the QoS and the hash of the type, as in rosbag2."""
-        details = {"offered_qos_profiles": _profile_text(qos), "topic_type_hash": type_hash}
+        details = {"offered_qos_profiles": dump(offered_qos(qos)), "topic_type_hash": type_hash}
         return cls(topic, type_name, definition.encode(), details, offered_qos(qos), type_hash)
 
     @property
@@ -217,11 +216,6 @@ class Recorded:
             offered_qos_profiles=self.qos,
             type_description_hash=self.type_hash,
         )
-
-
-@cache
-def _profile_text(qos: Qos) -> str:
-    return dump(offered_qos(qos))
 
 
 @dataclass(frozen=True, slots=True)

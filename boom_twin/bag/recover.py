@@ -44,7 +44,7 @@ def topic_of(definitions: FileDefinitions, channel: int, metadata: BagMetadata |
     )
 
 
-MOST_FAULTS = 1000  # limit for the number of faults that are reported one by one
+MOST_FAULTS = 20  # limit for the number of faults that are reported one by one
 
 
 @dataclass(slots=True)

@@ -83,9 +83,6 @@ def scan_records(path: Path, channels: Container[int] = ()) -> Iterator[SoundRec
             elif records := _whole_records(file, offset, size):
                 after = offset + len(records)
                 yield SoundRecords(offset, len(records), records)
-            elif length := _private_length(file, offset, size):
-                after = offset + length
-                yield SoundRecords(offset, length, b"")
             else:
                 after = _behind(file, offset + 1, size, channels)
                 yield DamagedBytes(offset, after - offset, "no record that is whole begins here")
@@ -146,33 +143,28 @@ def _whole_records(file: BinaryIO, offset: int, size: int) -> bytes:
 
 
 def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:
-    """Return the bytes of the record at `offset` if it is whole and of a kind outside chunks; else no bytes."""
+    """Return the bytes of the record at `offset` if it is whole and of a kind outside chunks; else no bytes.
+
+    Nothing in a message, or in a record of an application, tells that it is whole: another record must follow.
+    """
     file.seek(offset)
     raw = file.read(PREFIX.size)
     if len(raw) < PREFIX.size:
         return b""
     opcode, length = PREFIX.unpack(raw)
     end = offset + PREFIX.size + length
-    if end > size or length > MOST_HELD or (opcode != Opcode.MESSAGE and opcode not in KINDS):
+    if end > size or length > MOST_HELD or (opcode == Opcode.MESSAGE and length < MESSAGE_HEAD.size):
         return b""
-    if opcode == Opcode.MESSAGE and (length < MESSAGE_HEAD.size or not _may_begin(file, end, size)):
+    if opcode not in KINDS and not ((opcode == Opcode.MESSAGE or opcode >= PRIVATE) and _may_begin(file, end, size)):
         return b""
     file.seek(offset)
     record = file.read(PREFIX.size + length)
     try:
-        if opcode != Opcode.MESSAGE:
+        if opcode in KINDS:
             record_of(opcode, record[PREFIX.size :])
     except PARSE_ERRORS:
         return b""
     return record
-
-
-def _private_length(file: BinaryIO, offset: int, size: int) -> int:
-    """Return the bytes of the record at `offset` if it is an application's own, which the format lets readers skip; else 0."""
-    file.seek(offset)
-    opcode, length = PREFIX.unpack(file.read(PREFIX.size).ljust(PREFIX.size, b"\0"))
-    end = offset + PREFIX.size + length
-    return PREFIX.size + length if opcode >= PRIVATE and end <= size and _may_begin(file, end, size) else 0
 
 
 def _may_begin(file: BinaryIO, offset: int, size: int) -> bool:

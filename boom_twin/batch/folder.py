@@ -106,18 +106,12 @@ class BatchFolder:
         return self.folder / SESSIONS / key
 
     def kept(self, key: str, fingerprint: str) -> Row | None:
-        """Return the row of a session if it is finished and its `fingerprint` is equal; None otherwise.
-
-        BagError if the file is damaged.
-        """
-        file = self.folder / ROWS / f"{key}.json"
+        """Return the row of a finished session with an equal `fingerprint`; None without one, or if it is damaged."""
         try:
-            row = json.loads(file.read_bytes())
+            row = json.loads((self.folder / ROWS / f"{key}.json").read_bytes())
             return dict(row) if row["fingerprint"] == fingerprint else None
-        except FileNotFoundError:
-            return None
         except (OSError, ValueError, LookupError, TypeError, RecursionError):
-            raise BagError(f"{file}: this row of an earlier call is damaged. Its session is done anew.") from None
+            return None
 
     def keep(self, row: Row) -> None:
         write_atomic(self.folder / ROWS / f"{row['key']}.json", json.dumps(row) + "\n")

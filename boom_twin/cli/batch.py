@@ -9,14 +9,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import BagError, UsageError
+from ..errors import UsageError
 from ..offline.progress import ProgressLine
 from .arguments import add_session, at_least, positive, window_of
-from .output import tell, warn
+from .output import tell
 
 if TYPE_CHECKING:
     from ..batch.folder import BatchFolder
-    from ..batch.session_task import Row, SessionTask
+    from ..batch.session_task import SessionTask
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -42,7 +42,7 @@ def run(args: Namespace) -> int:
     """Replay what is not done yet, and write the table of all; exit code 1 if a session failed."""
     from ..batch.folder import PAGE, RIGS, TABLE, batch_folder, sessions_of, write_table
     from ..batch.results import counts, write_summaries
-    from ..batch.session_task import REMEDY, rows_here, rows_on_cluster
+    from ..batch.session_task import OK, REMEDY, rows_here, rows_on_cluster
     from ..system.processes import usable_cores
 
     if find_spec("pyarrow") is None:
@@ -52,7 +52,8 @@ def run(args: Namespace) -> int:
     sessions = sessions_of(args.bags)
     with batch_folder(args.out, sessions) as folder:
         tasks = _tasks(args, sessions, folder)
-        done = {task.key: row for task in tasks if (row := _kept(args, folder, task)) is not None}
+        kept = [row for task in tasks if (row := folder.kept(task.key, task.fingerprint)) is not None]
+        done = {row["key"]: row for row in kept if row["status"] == OK or not args.retry_failed}
         if waiting := [task for task in tasks if task.key not in done]:
             tell(f"{len(done)} of {len(tasks)} sessions are done")
             here = rows_here(waiting, args.workers or usable_cores())
@@ -108,14 +109,3 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
         )
         for session in sessions
     ]
-
-
-def _kept(args: Namespace, folder: BatchFolder, task: SessionTask) -> Row | None:
-    from ..batch.session_task import OK
-
-    try:
-        row = folder.kept(task.key, task.fingerprint)
-    except BagError as error:
-        warn(str(error))
-        return None
-    return None if row is not None and row["status"] != OK and args.retry_failed else row

@@ -23,13 +23,11 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     from ..bag.recover import recover
 
-    shown = 20  # faults that are printed one by one
-
     outcome = recover(Path(args.bag), Path(args.out))
-    for path, fault in outcome.faults[:shown]:
+    for path, fault in outcome.faults:
         tell(f"{path}: bytes {fault.offset} to {fault.offset + fault.length}: {fault.reason}")
-    if outcome.fault_count > shown:
-        tell(f"and {outcome.fault_count - shown} faults more")
+    if more := outcome.fault_count - len(outcome.faults):
+        tell(f"and {more} faults more")
     values = as_json(outcome, args.out)
     print_result(args.json, values, as_text(outcome, values))
     return 0

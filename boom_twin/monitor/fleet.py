@@ -31,8 +31,6 @@ LOG = logging.getLogger("boom_twin.monitor.webhook")
 MAX_WAITING = 100  # largest number of waiting messages; one more replaces the oldest
 PAUSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # pauses (s) before further attempts
 CLOSING_TIME = 2.0  # time (s) for waiting messages when the monitor ends
-TRY_AGAIN = (HTTPStatus.REQUEST_TIMEOUT, HTTPStatus.TOO_EARLY, HTTPStatus.TOO_MANY_REQUESTS)
-"""Status codes below 500 after which another attempt may succeed."""
 
 
 class Webhook:
@@ -88,26 +86,21 @@ class Webhook:
                     self._waiting.task_done()
 
     async def _attempts(self, session: ClientSession, message: Mapping[str, Any]) -> str:
-        for pause in (*PAUSES, None):
-            reason, may_succeed = await self._post(session, message)
-            if not reason or not may_succeed:
-                return reason
-            if pause is not None:
-                await asyncio.sleep(pause)
+        """Post a message until an attempt succeeds. Return "", or the reason of the last failure."""
+        for pause in (*PAUSES, 0.0):
+            if not (reason := await self._post(session, message)):
+                return ""
+            await asyncio.sleep(pause)
         return f"{reason}; {len(PAUSES) + 1} attempts"
 
-    async def _post(self, session: ClientSession, message: Mapping[str, Any]) -> tuple[str, bool]:
-        """Make one attempt. Return the reason of failure or "", and True if another attempt may succeed."""
+    async def _post(self, session: ClientSession, message: Mapping[str, Any]) -> str:
+        """Make one attempt. Return the reason of its failure, or ""."""
         try:
             async with session.post(self._url, json={"host": self._host, **message}, allow_redirects=False) as response:
-                status = response.status
-        except (ClientError, TimeoutError, OSError) as error:
-            return f"no connection ({type(error).__name__})", True
-        except ValueError as error:
-            return f"not posted ({type(error).__name__})", False
-        if HTTPStatus.OK <= status < HTTPStatus.MULTIPLE_CHOICES:
-            return "", False
-        return f"its answer is {status}", status >= HTTPStatus.INTERNAL_SERVER_ERROR or status in TRY_AGAIN
+                is_taken = HTTPStatus.OK <= response.status < HTTPStatus.MULTIPLE_CHOICES
+                return "" if is_taken else f"its answer is {response.status}"
+        except (ClientError, TimeoutError, OSError, ValueError) as error:
+            return f"not posted ({type(error).__name__})"
 
     def _give_up(self, message: Mapping[str, Any], reason: str) -> None:
         told = f"{message['event']} of alarm {message['channel']} ({message['kind']}) from {message['from']}"

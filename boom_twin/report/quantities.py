@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from hashlib import sha256
 from math import hypot, sqrt
@@ -142,15 +143,20 @@ def write(folder: Path, scene: Scene, found: list[Quantity]) -> Path:
     return path
 
 
-def read(folder: Path) -> tuple[str, list[Quantity]]:
-    """Return scene digest and quantities of a replay folder; raise BagError if they cannot be read."""
-    path = folder / FILE_NAME
+@contextmanager
+def _content(path: Path) -> Iterator[Any]:
+    """Yield the content of a JSON file of a replay. If it cannot be read or used, raise BagError."""
     try:
         with open_received(path) as file:
-            content = json.load(file)
-        return str(content["scene_sha256"]), [Quantity(**row) for row in content["quantities"]]
+            yield json.load(file)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BagError(f"{path}: {error}. Replay the session again with `boom_twin replay`.") from None
+
+
+def read(folder: Path) -> tuple[str, list[Quantity]]:
+    """Return scene digest and quantities of a replay folder; raise BagError if they cannot be read."""
+    with _content(folder / FILE_NAME) as content:
+        return str(content["scene_sha256"]), [Quantity(**row) for row in content["quantities"]]
 
 
 def digest(scene: Scene) -> str:
@@ -254,13 +260,9 @@ def side_of(path: Path, replayed: Callable[[Path], Path], window: TimeWindow = W
         raise UsageError(f"{path}: a replay folder has its own window. Give the session itself with --start and --duration.")
     folder = path if is_replay else replayed(path)
     scene, found = read(folder)
-    try:
-        with open_received(folder / "summary.json") as file:
-            summary = json.load(file)
+    with _content(folder / "summary.json") as summary:
         alarms, told = list(summary["alarms"]), summary["output_sha256"]
         incomplete = str(summary.get("session_incomplete", ""))
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise BagError(f"{folder / 'summary.json'}: {error}. Replay the session again with `boom_twin replay`.") from None
     bag = folder / "bag" / RESULT
     if bag.is_file() and sha256_of(bag) != told:
         raise BagError(f"{folder}: summary.json is not of the bag beside it. Replay the session again with `boom_twin replay`.")

@@ -8,7 +8,7 @@ import stat
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from tempfile import mkstemp
+from secrets import token_hex
 
 from ..errors import BagError, UsageError
 
@@ -18,9 +18,6 @@ HEAD = 4096  # number of first bytes of a file that identify an earlier result
 
 _RECORDINGS = frozenset({".mcap", ".db3", ".bag"})
 _BESIDE_THEM = frozenset({"metadata.yaml", "session.yaml", "truth.csv.gz"})
-
-_umask = os.umask(0)
-os.umask(_umask)
 
 
 def write_atomic(path: Path, content: str | bytes) -> None:
@@ -93,14 +90,14 @@ def sync_folder(folder: Path) -> None:
 
 
 def _replace(path: Path, data: bytes) -> None:
-    handle, name = mkstemp(prefix=f".{path.name}.", suffix=DRAFT, dir=path.parent)
-    draft = Path(name)
+    draft = path.with_name(f".{path.name}.{token_hex(4)}{DRAFT}")
     try:
-        with os.fdopen(handle, "wb") as stream:
+        with draft.open("xb") as stream:
             stream.write(data)
             stream.flush()
-            with suppress(PermissionError):  # of a file system without permissions
-                os.fchmod(stream.fileno(), stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask)
+            if path.exists():
+                with suppress(PermissionError):  # of a file system without permissions
+                    os.fchmod(stream.fileno(), stat.S_IMODE(path.stat().st_mode))
             os.fsync(stream.fileno())
         draft.replace(path)
     except BaseException:

@@ -122,14 +122,10 @@ def is_unfinished(folder: Path) -> bool:
 
 
 def _check_sources(out: Path, folder: Path, sources: Sequence[Path]) -> None:
-    """Refuse a folder that is a source, holds one, lies in one, or has a file that a source links to.
+    """Refuse a folder that is a source, holds one, lies in one, or has a file to which a link in a source leads.
 
-    Paths are compared by identity, not by spelling. A file that a source links to would be removed with an earlier result.
+    Folders are compared by identity, not by spelling. Such a file would be removed with an earlier result.
     """
-    own: dict[tuple[int, int], str] = {}
-    for name in _entries(folder):
-        with suppress(FileNotFoundError):  # another run may be at work there
-            own[_identity(folder / name)] = name
     for source in sources:
         real = real_path(source)
         session = real if real.is_dir() else real.parent
@@ -139,13 +135,9 @@ def _check_sources(out: Path, folder: Path, sources: Sequence[Path]) -> None:
         if folder.exists() and any(folder.samefile(each) for each in (real, *real.parents) if each.exists()):
             raise BagError(f"{out}: {source} lies in {folder}, and a source is never touched. Choose another folder.")
         for file in [source, *(source.iterdir() if source.is_dir() else ())]:
-            if file.exists() and (held := own.get(_identity(file))) is not None:
-                raise BagError(f"{folder}: its {held} is {file}, and a source is never touched. Choose another folder.")
-
-
-def _identity(path: Path) -> tuple[int, int]:
-    found = path.stat() if path.exists() else path.lstat()
-    return found.st_dev, found.st_ino
+            if file.exists() and folder in (held := file.resolve()).parents:
+                told = f"its {held.relative_to(folder)} is {file}"
+                raise BagError(f"{folder}: {told}, and a source is never touched. Choose another folder.")
 
 
 def _check_earlier(folder: Path, kind: ResultKind) -> None:

@@ -181,7 +181,7 @@ def test_an_alarm_is_posted_when_it_begins_changes_its_cause_and_ends() -> None:
 
 
 @pytest.mark.usefixtures("at_once")
-@pytest.mark.parametrize(("statuses", "told"), [((503,) * 4, "503; 4 attempts"), ((404,), "404"), ((302,), "302")])
+@pytest.mark.parametrize(("statuses", "told"), [((503,) * 4, "503; 4 attempts"), ((404, 404, 404, 302), "302; 4 attempts")])
 def test_it_gives_up_with_a_line_in_the_log(statuses: tuple[int, ...], told: str, caplog: pytest.LogCaptureFixture) -> None:
     live, receiver = Live(), Receiver(*statuses)
 
