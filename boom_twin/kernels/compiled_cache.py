@@ -144,8 +144,8 @@ class KernelCache:
     """The compiled code of one kernel on disk; has what numba's dispatcher asks of a cache.
 
     It loads without first filling numba's tables of types and of BLAS, which takes 0.25 s: only compiling needs them, which
-    fills them itself. The intermediate code beside the machine code is read only where a function that is no kernel copies
-    this one: reading it is four fifths of a load. Kernels that this one calls are loaded before it.
+    fills them itself. The intermediate code, which is four fifths of a load, is not kept: whoever calls a loaded kernel finds
+    its machine code. Kernels that this one calls are loaded before it.
 
     ImportError or AttributeError if numba does not have its parts where they were in the versions that are tested.
     """
@@ -171,10 +171,9 @@ class KernelCache:
         symbols, callee, calls, parts = pickle.loads(data)
         if not all(_is_there(each, context.codegen()._engine) for each in calls):
             return None
-        (name, kind, (machine, intermediate)), *others = _Parts(BytesIO(parts)).load()
+        (name, kind, machine), *others = _Parts(BytesIO(parts)).load()
         context.codegen()._engine._defined_symbols.update(symbols)
         loaded = self._rebuild(context, (name, kind, (machine, _nothing(context.codegen()))), *others)
-        _read_when_linked(loaded.library, intermediate)
         loaded.library.callee = callee
         return loaded
 
@@ -187,7 +186,9 @@ class KernelCache:
         if compiled.lifted or library.has_dynamic_globals or library._compiled_object is None:
             return
         with suppress(OSError):
-            kept = pickle.dumps((_symbols(library), library.callee, library.calls, pickle.dumps(self._reduce(compiled))))
+            (name, kind, (machine, _)), *others = self._reduce(compiled)
+            parts = pickle.dumps(((name, kind, machine), *others))
+            kept = pickle.dumps((_symbols(library), library.callee, library.calls, parts))
             write_checked(self._path(signature, compiled.codegen), kept)
 
     def enable(self) -> None:
@@ -237,19 +238,8 @@ def _is_there(callee: Any, engine: Any) -> bool:
 
 @cache
 def _nothing(codegen: Any) -> bytes:
-    """Intermediate code without any function, as what stands for that of a kernel until it is needed."""
+    """Return intermediate code without any function, in place of a loaded kernel's."""
     return bytes(codegen.create_library("nothing")._final_module.as_bitcode())
-
-
-def _read_when_linked(library: Any, intermediate: bytes) -> None:
-    """Let a loaded library read its intermediate code when it is asked for that the first time, to be linked into another."""
-    from llvmlite.binding import parse_bitcode
-
-    @cache
-    def module() -> Any:
-        return parse_bitcode(intermediate)
-
-    library._get_module_for_linking = module
 
 
 def read_checked(path: Path) -> bytes | None:

@@ -6,12 +6,15 @@ sweep stood in seven kernels, and compiling these copies was two thirds of all c
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 from llvmlite.binding import create_pass_builder, create_pipeline_tuning_options
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.extending import models, register_model
+from numba.types import Dispatcher, unliteral
 
 LEVEL = 1  # of optimisation; above it compiling takes longer, and steps as long
 
@@ -25,12 +28,27 @@ class Callee(NamedTuple):
     symbol: str
 
 
+class CalledKernel(Dispatcher):
+    """Type of a kernel that is called: a number in the source is no type of its own, for which it were compiled once more."""
+
+    def get_call_type(self, context: Any, arguments: Any, named: Any) -> Any:
+        """Return the signature for the arguments' types, after compiling for it if need be."""
+        return super().get_call_type(context, map(unliteral, arguments), {key: unliteral(each) for key, each in named.items()})
+
+
+register_model(CalledKernel)(models.OpaqueModel)
+
+
 class KernelCode(JITCodeLibrary):
-    """Code of a kernel with all that it calls but kernels; `calls` are those, whose machine code must be there before."""
+    """Code of a kernel with its `parts`, all that it calls but kernels.
+
+    `calls` are the kernels that it calls, whose machine code must be there before.
+    """
 
     def __init__(self, codegen: Any, name: str) -> None:
         super().__init__(codegen, name)
         self.calls: set[Callee] = set()
+        self.parts: dict[Any, None] = {}  # each after one that calls it, else LLVM leaves it out
         self.enable_object_caching()
 
     def _optimize_functions(self, ll_module: Any) -> None:
@@ -50,21 +68,25 @@ class KernelCode(JITCodeLibrary):
         builder.getModulePassManager().run(self._final_module, builder)
 
     def add_linking_library(self, library: Any) -> None:
-        """Copy a function's code into this one, unless it is a kernel's."""
+        """Note a function that is called, with those that it calls itself."""
         if (callee := getattr(library, "callee", None)) is not None:
             self.calls.add(callee)
         else:
             self.calls |= getattr(library, "calls", set())
-            super().add_linking_library(library)
+            self.parts |= {library: None} | getattr(library, "parts", {})
+
+    def finalize(self) -> None:
+        """Copy every part into this code once, and compile it."""
+        for part in self.parts:
+            super().add_linking_library(part)
+        super().finalize()
 
 
 class InlinedCode(KernelCode):
-    """Intermediate code of a function and of those that it calls, for the kernels that it is copied into."""
+    """Intermediate code of a function alone, for the kernels that it is copied into."""
 
-    def _optimize_final_module(self) -> None:
-        """The kernel's own optimisation sees it."""
-
-    def _finalize_final_module(self) -> None:
+    def finalize(self) -> None:
+        """Leave it as it is: it is copied, optimised and compiled with each kernel."""
         self._finalize_dynamic_globals()
         self._finalized = True
 
@@ -92,7 +114,12 @@ class KernelCompiler(Compiler):
         if self._owners.setdefault((name.modname, name.func_qualname), name.func) is name.func:
             name.unique_id, name.unique_name = 0, name.func_qualname  # numba counts from 1 in the order of compiling
         self.state.library = KernelCode(self.state.targetctx.codegen(), name.func_qualname)
-        compiled = super()._compile_bytecode()
+        thresholds = gc.get_threshold()
+        gc.set_threshold(100_000)  # looking for cycles among millions of new objects takes a sixth of the time
+        try:
+            compiled = super()._compile_bytecode()
+        finally:
+            gc.set_threshold(*thresholds)
         symbol = compiled.fndesc.llvm_func_name
         compiled.library.callee = Callee(name.modname, name.func_qualname, compiled.signature.args, symbol)
         return compiled

@@ -140,9 +140,11 @@ class Kernel:
 
         return {"pipeline_class": KernelCompiler}
 
-    @property
+    @cached_property
     def _numba_type_(self) -> Any:
-        return self.dispatcher._numba_type_
+        from .inlining import CalledKernel
+
+        return CalledKernel(self.dispatcher)
 
     def __call__(self, *arguments: Any) -> Any:
         return self.dispatcher(*map(_argument, arguments))
@@ -191,13 +193,13 @@ class Inner(Kernel):
 
 
 def _packed(value: Any) -> tuple[str, Sequence[Any]]:
-    """Return how compiled code has a value in memory: a format of `struct`, and its numbers."""
+    """Return how compiled code has a value in memory, eight bytes a number: a format of `struct`, and the numbers."""
     if isinstance(value, np.ndarray):  # see `ARRAY`
         return f"{5 + 2 * value.ndim}q", (0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides)
     if isinstance(value, tuple):
         layouts, numbers = zip(*map(_packed, value), strict=True)
         return "".join(layouts), [number for each in numbers for number in each]
-    return "?" if isinstance(value, bool) else "d" if isinstance(value, float) else "q", [value]
+    return "d" if isinstance(value, float) else "q", [value]
 
 
 def kernel(function: Callable[..., Any]) -> Kernel:

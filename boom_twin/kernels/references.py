@@ -13,9 +13,8 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
-from llvmlite import ir
 from numba import __version__ as numba_version
-from numba.core.typing.templates import AttributeTemplate
+from numba.core.typing.templates import AttributeTemplate  # what the public `infer_getattr` wants
 from numba.extending import (
     NativeValue,
     infer_getattr,
@@ -25,29 +24,38 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
-from numba.types import Array, NamedTuple, Type
+from numba.types import Array, BaseTuple, NamedTuple, Type, intp
 
 from .jit import ARRAY, HeldFields, _kind
 
 
 class Reference(Type):
-    """numba's type of a named tuple by reference; `fields` is its type by value."""
+    """numba's type of a named tuple by reference; `fields` is its type by value, `places` where each begins in the table."""
 
     def __init__(self, fields: Any) -> None:
         self.fields = fields
+        words = [_words(kind) for kind in fields.types]
+        self.places = [sum(words[:i]) for i in range(len(words))]
         digest = hashlib.sha256(str(fields).encode()).hexdigest()[:16]
         super().__init__(f"{fields.instance_class.__name__}_{digest}")
 
 
+def _words(kind: Any) -> int:
+    """Return how many words of the table a value takes."""
+    if isinstance(kind, BaseTuple):
+        return sum(map(_words, kind))
+    return len(ARRAY) - 2 + 2 * kind.ndim if isinstance(kind, Array) else 1
+
+
 @register_model(Reference)
 class ReferenceModel(models.PrimitiveModel):
-    """An address."""
+    """An address of words."""
 
     def __init__(self, manager: Any, of: Reference) -> None:
         for each in (manager.lookup(kind) for kind in of.fields.types if isinstance(kind, Array)):
             if [each.get_field_position(name) for name in ARRAY] != list(range(len(ARRAY))):
                 raise ImportError(f"numba {numba_version} keeps arrays otherwise than the versions that were tested")
-        super().__init__(manager, of, manager.lookup(of.fields).get_value_type().as_pointer())
+        super().__init__(manager, of, manager.lookup(intp).get_value_type().as_pointer())
 
 
 @infer_getattr
@@ -64,25 +72,36 @@ class ReferenceAttribute(AttributeTemplate):
 @lower_getattr_generic(Reference)
 def field_of(context: Any, builder: Any, of: Reference, address: Any, name: str) -> Any:
     """Load a field."""
-    return _load(builder, _part(builder, address, of.fields.fields.index(name)))
+    i = of.fields.fields.index(name)
+    return _load(context, builder, of.fields.types[i], address, of.places[i])
 
 
-def _part(builder: Any, address: Any, i: int) -> Any:
-    """Emit the address of part `i` of an aggregate."""
-    return builder.gep(address, [ir.IntType(32)(0), ir.IntType(32)(i)], inbounds=True)
-
-
-def _load(builder: Any, address: Any) -> Any:
+def _load(context: Any, builder: Any, kind: Any, address: Any, place: int) -> Any:
     """Load a value that nobody changes, number by number: an aggregate would lose the mark."""
-    kind = address.type.pointee
-    if isinstance(kind, (ir.LiteralStructType, ir.ArrayType)):
-        value = ir.Constant(kind, ir.Undefined)
-        for i in range(len(kind)):
-            value = builder.insert_value(value, _load(builder, _part(builder, address, i)), i)
+
+    def word(i: int, kind: Any) -> Any:
+        at = builder.gep(address, [context.get_constant(intp, place + i)], inbounds=True)
+        loaded = builder.load(builder.bitcast(at, kind.as_pointer()))
+        loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return loaded
+
+    if isinstance(kind, Array):  # kernels own no memory: `meminfo` and `parent` stay null
+        value = context.get_constant_null(kind)
+        *numbers, shape, strides = value.type.elements
+        for i in range(2, len(numbers)):
+            value = builder.insert_value(value, word(i, numbers[i]), i)
+        for axis in range(kind.ndim):
+            for part, each in enumerate((shape, strides)):
+                loaded = word(len(numbers) + part * kind.ndim + axis, each.element)
+                value = builder.insert_value(value, loaded, [len(numbers) + part, axis])
         return value
-    loaded = builder.load(address)
-    loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
-    return loaded
+    if isinstance(kind, BaseTuple):
+        value = context.get_constant_null(kind)
+        for i, part in enumerate(kind):
+            value = builder.insert_value(value, _load(context, builder, part, address, place), i)
+            place += _words(part)
+        return value
+    return word(0, context.get_value_type(kind))
 
 
 @unbox(Reference)

@@ -31,7 +31,7 @@ print(found, "loaded", 0 if hits is None else sum(hits.values()))
 """
 
 CALLER = """
-@kernel
+@{by}
 def add_three(x, y, z):
     return add(add(x, y), z)
 print(add_three(1.0, 2.0, 3.0))
@@ -81,9 +81,11 @@ def test_machine_code_whose_handing_over_was_interrupted_is_used_and_not_kept(tm
     assert list((tmp_path / "cache").glob("*/*.kernel")) == []
 
 
-def test_a_loaded_kernel_can_be_called_by_one_that_is_compiled(tmp_path: Path) -> None:
-    run(tmp_path / "cache")
-    assert told(run(tmp_path / "cache", after=CALLER)).splitlines() == ["(4.0, 4.0) loaded 2", "11.0"]
+@pytest.mark.parametrize("by", ["kernel", "__import__('numba').njit"])
+def test_a_loaded_kernel_can_be_called_by_what_is_compiled(tmp_path: Path, compiled: Path, by: str) -> None:
+    shutil.copytree(compiled, tmp_path / "cache")
+    done = run(tmp_path / "cache", after=CALLER.format(by=by))
+    assert told(done).splitlines() == ["(4.0, 4.0) loaded 2", "11.0"]
 
 
 def test_caches_that_no_installation_uses_are_removed_with_a_new_one(
