@@ -15,7 +15,7 @@ from ..config.settings import Settings
 from ..errors import UsageError
 from ..kernels.elements.beam_shapes import integrals_to, rotations_at
 from ..kernels.jit import inner, kernel
-from ..kernels.tables import BEAM, FRAME_ANGLE, JOINT_A, JOINT_B, OFFSET
+from ..kernels.tables import BEAM, FRAME_ANGLE, OFFSET
 from ..types import SENSORS, Array, Place, Stream, channels_of, streams_of
 from .delayed import begin_instant, copy_reading
 from .rows import (
@@ -30,7 +30,7 @@ from .rows import (
     site_column,
     variance_of,
 )
-from .sensor_model import Mounting
+from .sensor_model import Mounting, section_frames
 from .states import PREDICTION, all_states, zero_place
 
 READS_ANGLE, READS_FORCE, READS_ACCELERATION, READS_RATE, READS_MOMENT, READS_COORDINATE, READS_NOTHING = range(7)
@@ -216,42 +216,42 @@ def measurement_of(
     sites, rows, errors = _Sites(plan), list[tuple[float, ...]](), list[tuple[float, float, bool]]()
     bending = list[Array]()
     n, codes = plan.joints, {stream: code for code, stream in enumerate(Stream)}
+
+    def add(stream: Stream, reads: int, index: int, site: int = 0, turned: float = 0.0, zero: int = 0, behind: int = 0) -> None:
+        """Add a channel whose reading depends on its zero, and on as many states up to `behind` places further."""
+        rows.append((codes[stream], reads, index, site, turned, zero, zero + behind, settings.variance(SENSORS[stream])))
+
     for stream, names in channels_of(n, streams_of(places)).items():
-        kind, behind = SENSORS[stream], TIP_IMU_STATES + 2 * n + len(errors)
-        noise2 = settings.variance(kind)
+        kind, new = SENSORS[stream], TIP_IMU_STATES + 2 * n + len(errors)
+        place = places.get(kind.stem, Place())
         if stream is Stream.ANGLES:
-            at_frames = [sites.fixed(i, int(mounting.frames[i])) if mounting.sways[i] else 0 for i in range(n)]
-            rows += [
-                (codes[stream], READS_ANGLE, i, site, 0.0, at := TIP_IMU_STATES + i, at, noise2)
-                for i, site in enumerate(at_frames)
-            ]
+            for i in range(n):
+                site = sites.fixed(i, int(mounting.frames[i])) if mounting.sways[i] else 0
+                add(stream, READS_ANGLE, i, site, zero=TIP_IMU_STATES + i)
         elif stream is Stream.FORCES:
-            rows += [(codes[stream], READS_FORCE, i, 0, 0.0, at := TIP_IMU_STATES + n + i, at, noise2) for i in range(n)]
+            for i in range(n):
+                add(stream, READS_FORCE, i, zero=TIP_IMU_STATES + n + i)
         elif names and kind.is_accelerometer:
-            place, first = places.get(kind.stem, Place()), 0 if stream is Stream.IMU else behind
-            site = sites.of(place, kind.stem)
-            last = first + IMU_STATES - 1
-            rows += [
-                (codes[stream], READS_ACCELERATION, i, site, place.turned, first + i, last, noise2) for i in range(len(names))
-            ]
+            first, site = 0 if stream is Stream.IMU else new, sites.of(place, kind.stem)
+            for i in range(len(names)):
+                add(stream, READS_ACCELERATION, i, site, place.turned, first + i, IMU_STATES - 1 - i)
             if stream is not Stream.IMU:
                 errors += [(IMU_ZERO, IMU_DRIFT, False)] * 2 + [(IMU_TURN, 0.0, False), (IMU_SCALE, 0.0, False)]
         elif names and kind.field == "angular_velocity":
-            place = places.get(kind.stem, Place())
-            rows.append((codes[stream], READS_RATE, 0, sites.of(place, kind.stem), place.turned, behind, behind, noise2))
+            add(stream, READS_RATE, 0, sites.of(place, kind.stem), place.turned, new)
             errors.append((RATE_ZERO, RATE_DRIFT, False))
         elif names and kind.field == "point":
-            site = sites.of(places[kind.stem], kind.stem)
-            rows += [(codes[stream], READS_COORDINATE, i, site, 0.0, behind + i, behind + i, noise2) for i in range(len(names))]
+            for i in range(len(names)):
+                add(stream, READS_COORDINATE, i, sites.of(place, kind.stem), zero=new + i)
             errors += [(POINT_ZERO, POINT_DRIFT, False)] * len(names)
         elif stream is Stream.MOMENTS:
             for section, name in enumerate(names, start=1):
                 if name not in places:
-                    rows.append((codes[stream], READS_NOTHING, 0, 0, 0.0, 0, 0, noise2))
+                    add(stream, READS_NOTHING, 0)
                     continue
-                place, at = places[name], TIP_IMU_STATES + 2 * n + len(errors)
+                place = places[name]
+                add(stream, READS_MOMENT, len(bending), zero=TIP_IMU_STATES + 2 * n + len(errors))
                 bending.append(sites.bending(replace(place, section=place.section or section), name))
-                rows.append((codes[stream], READS_MOMENT, len(bending) - 1, 0, 0.0, at, at, noise2))
                 errors.append((np.inf, 0.0, False))  # by the moment that is there, see `BoomPredictor.start`
     lags = dict[Stream, int]()
     for stream in lagging:
@@ -277,9 +277,8 @@ class _Sites:
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
-        kinds = plan.tables.operations.kind
-        self._roots = np.append(np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1, len(kinds) + 1).tolist()
-        self.found: list[_Found] = [((plan.joints - 1, len(kinds), -1, 0.0), 0.0)]
+        self._roots, self._heads = (frames.tolist() for frames in section_frames(plan))
+        self.found: list[_Found] = [((plan.joints - 1, self._heads[-1], -1, 0.0), 0.0)]
 
     def of(self, place: Place, name: str) -> int:
         """Return the number of a place on the boom among those found; UsageError if it is not on it."""
@@ -302,7 +301,7 @@ class _Sites:
         return self._looked_up(section - 1, place.at, name)
 
     def _looked_up(self, section: int, at: float | None, name: str) -> _Found:
-        t, start, end = self._plan.tables, 0.0, self._roots[section + 1] - 1
+        t, start, end = self._plan.tables, 0.0, self._heads[section]
         for frame in range(self._roots[section], end):
             operation = t.operations[frame]
             if operation.kind not in (OFFSET, BEAM):

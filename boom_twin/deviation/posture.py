@@ -34,7 +34,7 @@ from ..kernels.transfer.time_step import ANEW, advance
 from ..types import Array, StrokeReading
 from .channels import TIP_IMU_STATES, Measurement
 from .mode_tracking import iterate_modes, modal_loss, nudge_of, restore
-from .sensor_model import Mounting
+from .sensor_model import Mounting, section_frames
 
 FORCE_SIZE = 1.0  # N
 DRIVE_SIZE = 1e-6  # m, loads that differences are taken over
@@ -114,8 +114,7 @@ def new_posture(
     """
     n, unknowns, histories = plan.joints, len(plan.names), len(plan.masses)
     width = 2 * n + 3 * len(measured.sites)
-    kinds, columns = plan.tables.operations.kind, 2 + n + most
-    roots = np.append(np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1, len(kinds))
+    columns, (roots, heads) = 2 + n + most, section_frames(plan)
     return Posture(
         modes=np.zeros(1, np.int64), drives=np.full(n, np.inf), angles=np.zeros(n), rest=np.zeros(unknowns),
         columns=np.zeros((columns, unknowns)), motions=np.zeros((most, histories)), readings=np.zeros((columns, width)),
@@ -126,7 +125,7 @@ def new_posture(
         reads_angle=reads is StrokeReading.ANGLE,
         tilt=np.where(mounting.absolute, inclination, 0.0), gravity=np.array(plan.tables.gravity), slope=np.zeros(n),
         curvature=np.zeros(n), frames=mounting.frames.astype(np.int64), absolute=mounting.absolute, sways=mounting.sways,
-        roots=roots.astype(np.int64), masses=plan.masses, points=np.array(list(_mass_points(plan))),
+        roots=np.append(roots, heads[-1]).astype(np.int64), masses=plan.masses, points=np.array(list(_mass_points(plan))),
         lengths=lengths, closed=plan.closed_lengths, **measured._asdict(),
         behind=np.array([TIP_IMU_STATES + 2 * n]), delayed=np.zeros(1, np.int64),
         still=np.zeros(histories), position=np.zeros(histories), hat=np.zeros(histories),

@@ -53,6 +53,13 @@ class Mounting(NamedTuple):
     sways: NDArray[np.bool_]
 
 
+def section_frames(plan: Plan) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the frames of root and head of every section, shape (n,) each."""
+    kinds = plan.tables.operations.kind
+    roots = np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1
+    return roots, np.append(roots[1:] - 1, len(kinds))
+
+
 def mounting_of(plan: Plan, mounts: Sequence[Mount | None]) -> Mounting:
     """Return the mounting of the sensors of each joint; None is an encoder, and no mounts at all are encoders.
 
@@ -64,9 +71,7 @@ def mounting_of(plan: Plan, mounts: Sequence[Mount | None]) -> Mounting:
     mounts = mounts or [None] * plan.joints
     if len(mounts) != plan.joints:
         raise UsageError(f"mounts has {len(mounts)} entries, not {plan.joints}. Give one for each joint, or none.")
-    kinds = plan.tables.operations.kind
-    roots = np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1
-    heads = np.append(roots[1:] - 1, len(kinds))
+    roots, heads = section_frames(plan)
     is_head = np.array([str(mount).startswith("head") for mount in mounts])
     absolute, sways = ([mount is not None for mount in mounts], [mount in ("root", "head") for mount in mounts])
     return Mounting(np.where(is_head, heads, roots), np.array(absolute), np.array(sways))
