@@ -7,7 +7,7 @@ import pytest
 from default_boom import EXACT, strokes_of_posture
 
 from boom_twin import Sample, Stream, Twin, load_scene, statics
-from boom_twin.health.causes import Fault, hypothesis
+from boom_twin.health.faults import Fault, hypothesis
 from boom_twin.scene.edit import loaded
 from boom_twin.types import Alarm, Array, Ranked, StrokeReading
 
