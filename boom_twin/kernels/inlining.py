@@ -104,7 +104,17 @@ class InlinedCode(KernelCode):
         return 0
 
 
-class KernelCompiler(Compiler):
+class LeanCompiler(Compiler):
+    """numba's compiler without its passes for what kernels do not have: closures, and expressions of whole arrays."""
+
+    def define_pipelines(self) -> Any:
+        """Return the passes."""
+        (found,) = super().define_pipelines()
+        found.passes = [each for each in found.passes if each[0].name() not in ("inline_closure_likes", "nopython_rewrites")]
+        return [found]
+
+
+class KernelCompiler(LeanCompiler):
     """numba's compiler, with `KernelCode` for its result, and the same name for the same function in every process."""
 
     _owners: ClassVar[dict[tuple[str, str], Callable[..., Any]]] = {}
@@ -114,18 +124,18 @@ class KernelCompiler(Compiler):
         if self._owners.setdefault((name.modname, name.func_qualname), name.func) is name.func:
             name.unique_id, name.unique_name = 0, name.func_qualname  # numba counts from 1 in the order of compiling
         self.state.library = KernelCode(self.state.targetctx.codegen(), name.func_qualname)
-        thresholds = gc.get_threshold()
-        gc.set_threshold(100_000)  # looking for cycles among millions of new objects takes a sixth of the time
+        first, *others = gc.get_threshold()
+        gc.set_threshold(max(first, 100_000))  # looking for cycles among millions of new objects takes a sixth of the time
         try:
             compiled = super()._compile_bytecode()
         finally:
-            gc.set_threshold(*thresholds)
+            gc.set_threshold(first, *others)
         symbol = compiled.fndesc.llvm_func_name
         compiled.library.callee = Callee(name.modname, name.func_qualname, compiled.signature.args, symbol)
         return compiled
 
 
-class InlinedCompiler(Compiler):
+class InlinedCompiler(LeanCompiler):
     """numba's compiler, with `InlinedCode` for its result."""
 
     def __init__(self, typingctx: Any, targetctx: Any, library: Any, *arguments: Any) -> None:
