@@ -32,7 +32,19 @@ from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .rest_at_readings import RestFinder
 from .sensor_model import mounting_of
-from .states import DOUBTS, ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
+from .states import (
+    DOUBTS,
+    ESTIMATE,
+    FED,
+    FED_STAMP,
+    PREDICTION,
+    STARTED,
+    Filters,
+    SensorNoise,
+    drive_place,
+    new_filters,
+    zero_place,
+)
 from .tip_estimate import add_scene_error
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
@@ -301,7 +313,7 @@ class BoomPredictor:
 
     def rebase(self, shift: int) -> None:
         """Shift stamps by `shift` (ns) from now on."""
-        self.filters.status[FED_STAMP] += shift
+        self.filters.status[[FED_STAMP, STARTED]] += shift
         self.filters.instants[:] += shift
 
     def add_phase(self) -> None:
