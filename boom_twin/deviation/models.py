@@ -30,6 +30,7 @@ import math
 from ..kernels.jit import inner, kernel
 from .kalman import (
     FAST,
+    correct,
     first_variances,
     gain_after,
     log_innovation,
@@ -61,6 +62,8 @@ from .states import (
 
 JERK = 3e-3  # m^2/s^5, density of the jerk of a drive that begins to move
 CLOSED_RATE, CLOSED_ACCELERATION = 1e-5, 1e-3  # m/s, m/s^2, noise of the reading that a closed valve's drive stands still
+UNREAD = 0.1  # m, standard deviation of a moving drive before the first reading: more than oil is ever compressed by
+FIRST_CHANCES = 0.89, 0.01, 0.1  # of the models; few sessions start in a move
 LONGEST_STEP = 0.02  # s of one transition
 CONTRADICTION = 8.0  # standard deviations by which the tips of estimate and prediction may differ
 MOST_EXCESS = 1e6  # times the variance that a channel is stated to have
@@ -93,23 +96,28 @@ def start_models(p, f, speed, swing, may_move):
         f.jerk[i], f.is_open[PREDICTION, i], f.still[PREDICTION, i] = JERK, 1 if may_move else 0, 0.0
         f.length2[i], f.pulls[i] = noise.length2, p.pulled[i]
         f.before[i, 0] = f.before[i, 1] = f.before[i, 2] = math.nan
+    f.bends[:], f.swing[:], f.sway2[:] = 0.0, 0.0, 0.0
     copy_model(f, VALVES, OPEN, size)
-    add_motion(p, f.p[OPEN], speed, swing)
+    add_motion(p, f, speed, swing)
     if may_move:
         copy_model(f, OPEN, VALVES, size)
     copy_model(f, VALVES, BURST, size)
-    f.chances[VALVES], f.chances[OPEN], f.chances[BURST] = 0.8, 0.1, 0.1
+    f.chances[VALVES], f.chances[OPEN], f.chances[BURST] = FIRST_CHANCES
     f.excess[:], f.ratio[:], f.shaking[:] = 1.0, 1.0, 0.0
-    f.bends[:], f.swing[:], f.sway2[:] = 0.0, 0.0, 0.0
     mix(f, PREDICTION, zero_place(p))
     take_prediction(p, f, 1.0)
     f.status[FED] = 0
 
 
 @inner
-def add_motion(p, covariance, speed, swing):
-    """Add the variances of drives that may move at `speed` (m/s), and of a tip that may vibrate by `swing` (m)."""
-    n, m, drive = p.drives.shape[0], p.modes[0], drive_place(p)
+def add_motion(p, f, speed, swing):
+    """Let drives of the model of open valves move at `speed` (m/s), and the tip vibrate by `swing` (m).
+
+    A length is the sum of the drive and the oil's compression. In a move neither is that at rest, so the first reading gives
+    their sum only. It is taken here because it does not tell this model from those of rest, which it has made.
+    """
+    n, m, drive, size = p.drives.shape[0], p.modes[0], drive_place(p), zero_place(p)
+    x, covariance = f.x[OPEN], f.p[OPEN]
     for j in range(m):
         omega2, motion2, off2 = p.omega[j] * p.omega[j], reach2(p, 2 + n + j), 0.0
         if j == 0 and motion2 > 0.0:
@@ -119,7 +127,11 @@ def add_motion(p, covariance, speed, swing):
         covariance[j, j] += off2
         covariance[m + j, m + j] += omega2 * off2
     for i in range(n):
+        covariance[drive + i, drive + i] = UNREAD * UNREAD
         covariance[drive + n + i, drive + n + i] += speed * speed
+    for i in range(n):
+        drive_row(p, f, i, x, f.row, size)
+        correct(x, covariance, f.row, f.gains[0], 0.0, f.noise.length2, size)
 
 
 @inner

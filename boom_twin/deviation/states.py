@@ -18,7 +18,7 @@ VALVES, OPEN, BURST = range(3)  # models of the prediction
 ALL_VALVES, ALL_OPEN, ALL_BURST = range(3, 6)  # models of the estimate
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
 LOADS = 6  # states of the load at the tip: along x and y its fast part (2), its slow part (2), rates of the fast part (2)
-FED, FED_STAMP, DOUBTS, IS_OLD = range(4)  # of `status`
+FED, FED_STAMP, DOUBTS, IS_OLD, STARTED = range(5)  # of `status`
 LOGGED = 64  # innovations of a channel that are kept: of a second of a fault twin
 DELAYED = 128  # states at most that hold readings of late streams, see `delayed`
 
@@ -55,8 +55,8 @@ class Filters(NamedTuple):
     jerk: Array  # (n,) density of the jerk of drives, m^2/s^5
     is_open: NDArray[np.int64]  # (2, n) 1 where a valve is believed open
     still: Array  # (2, n) time since its drive began to stand still, s
-    # (4,) whether the estimate has readings of its own, stamp of the newest of these, doubts by the prediction, whether its
-    # covariance in `spread` is older than its models
+    # (5,) whether the estimate has readings of its own, stamp of the newest of these, doubts by the prediction, whether its
+    # covariance in `spread` is older than its models, stamp of the first lengths
     status: NDArray[np.int64]
     masked: NDArray[np.bool_]  # (c,) channels that the estimate is not to use
     deaf: NDArray[np.bool_]  # (n,) lengths that no model is to use
@@ -127,7 +127,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
     return Filters(
         x=np.zeros((6, states)), p=vectors(6, states, states), chances=np.zeros(6), mean=np.zeros((2, states)),
         spread=vectors(2, states, states), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros((2, n), np.int64),
-        still=np.zeros((2, n)), status=np.zeros(4, np.int64), masked=np.zeros(channels, np.bool_),
+        still=np.zeros((2, n)), status=np.zeros(5, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
         ways=np.zeros((n + 1, 7)), swing=np.zeros(modes), inputs=np.zeros(2 * modes),

@@ -29,9 +29,10 @@ from .rows import (
     variance_of,
 )
 from .sensor_model import specific_force
-from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, drive_place, force_place, zero_place
+from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, STARTED, drive_place, force_place, zero_place
 
 PATIENCE = 1_000_000_000  # ns without readings after which the estimate is the prediction again
+STARTING = 1_000_000_000  # ns after the start; a valve that is found open by then was open at the start
 FOLLOW = np.bool_(True)  # of `linearise`, see `boom_twin.kernels.transfer.time_step.ANEW`
 ANGLE_STEP = 0.01  # rad that a joint turns by before the boom is linearised anew
 
@@ -69,7 +70,11 @@ def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
         status = linearise(t, boom, work, p, f.mean[PREDICTION, drive : drive + n], FOLLOW)
         if status != OK:
             return status
-    if f.status[FED] == 1 and stamp - f.status[FED_STAMP] > PATIENCE:
+    if h == 0.0:
+        f.status[STARTED] = stamp
+    # zeros of sensors that were learnt from a boom at rest are wrong if it moved
+    started_in_move = stamp - f.status[STARTED] < STARTING and f.is_open[PREDICTION].any()
+    if f.status[FED] == 1 and (stamp - f.status[FED_STAMP] > PATIENCE or started_in_move):
         f.status[FED], f.apart[:] = 0, 0.0
     step_models(p, f, h, y)
     if not is_finite(p, f):
