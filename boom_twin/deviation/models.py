@@ -54,6 +54,7 @@ from .states import (
     PREDICTION,
     VALVES,
     all_states,
+    copy_place,
     drive_place,
     force_place,
     whole,
@@ -193,7 +194,7 @@ def states_of(p, mixture):
 def hold_still(p, f, k, is_open, size):
     """Correct model `k` by readings of zero rate and acceleration of drives behind closed valves."""
     n, drive, count, gains, width = p.drives.shape[0], drive_place(p), 0, f.gains[0], whole(size)
-    keep_unread(p, f, k)
+    keep_unread(p, f, k, size)
     for i in range(n):
         if is_open[i] == 0 and not f.deaf[i]:
             for order in (1, 2):
@@ -206,7 +207,7 @@ def hold_still(p, f, k, is_open, size):
                 expected = gain[at] + noise * noise
                 count = take_innovation(f.x[k], f.p[k], gains, count, -f.x[k, at], expected, size)
     take_gains(f.p[k], gains, count, size)
-    restore_unread(p, f, k)
+    restore_unread(p, f, k, size)
 
 
 @inner
@@ -237,7 +238,7 @@ def drive_noise2(p, f, i):
 def take_lengths(p, f, k, size, y):
     """Correct model `k` by readings `y` (n; NaN = missing); return their log likelihood."""
     total, count, gains = 0.0, 0, f.gains[0]
-    keep_unread(p, f, k)
+    keep_unread(p, f, k, size)
     for i in range(y.shape[0]):
         if math.isfinite(y[i]) and not f.deaf[i]:
             innovation = y[i] - f.offsets[i] - read(f.driving[i], f.x[k], size)
@@ -245,36 +246,46 @@ def take_lengths(p, f, k, size, y):
             count = take_innovation(f.x[k], f.p[k], gains, count, innovation, expected, size)
             total -= 0.5 * (innovation * innovation / expected + math.log(expected))
     take_gains(f.p[k], gains, count, size)
-    restore_unread(p, f, k)
+    restore_unread(p, f, k, size)
     return total
 
 
 @inner
-def keep_unread(p, f, k):
+def keep_unread(p, f, k, size):
     """Write to scratch what model `k` knows of drives whose transducers are left out, for `restore_unread`.
 
     Lengths of other cylinders depend on such a drive only by how it turns the boom, which is linear near the posture alone. So
     they do not correct it, but their expected errors contain its variance: a consider state (S. Schmidt, Advances in Control
-    Systems 3 (1966), 293-340).
+    Systems 3 (1966), 293-340). Copies of late readings contain the drive as it was, so they are consider states too: corrected
+    without the drive, they would no longer tell of it.
     """
-    n, drive = p.drives.shape[0], drive_place(p)
-    for i in range(3 * n):
-        if f.deaf[i % n]:
-            f.turned[i, 3 * n] = f.x[k, drive + i]
-            for j in range(3 * n):
-                f.turned[i, j] = f.p[k, drive + i, drive + j]
+    if not f.deaf.any():
+        return
+    for i in range(size):
+        if is_unread(p, f, i):
+            f.kept_mean[i] = f.x[k, i]
+            for j in range(size):
+                f.kept[i, j] = f.p[k, i, j]
 
 
 @inner
-def restore_unread(p, f, k):
+def restore_unread(p, f, k, size):
     """Undo what readings since `keep_unread` told model `k` of drives whose transducers are left out."""
-    n, drive = p.drives.shape[0], drive_place(p)
-    for i in range(3 * n):
-        if f.deaf[i % n]:
-            f.x[k, drive + i] = f.turned[i, 3 * n]
-            for j in range(3 * n):
-                if f.deaf[j % n]:
-                    f.p[k, drive + i, drive + j] = f.turned[i, j]
+    if not f.deaf.any():
+        return
+    for i in range(size):
+        if is_unread(p, f, i):
+            f.x[k, i] = f.kept_mean[i]
+            for j in range(size):
+                if is_unread(p, f, j):
+                    f.p[k, i, j] = f.kept[i, j]
+
+
+@inner
+def is_unread(p, f, i):
+    """Return True if state `i` is of a drive whose transducer is left out, or the copy of a late reading."""
+    n, at = p.drives.shape[0], i - drive_place(p)
+    return i >= copy_place(p) or (0 <= at < 3 * n and f.deaf[at % n])
 
 
 @inner

@@ -99,6 +99,8 @@ class Filters(NamedTuple):
     logged: NDArray[np.int64]  # (n + c,) how many of each channel
     # scratch
     turned: Array
+    kept: Array
+    kept_mean: Array
     row: Array
     gain: Array
     gains: Array
@@ -135,6 +137,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         late=np.zeros(len(Stream)), taken=np.zeros(len(Stream), np.int64), curves=np.zeros((channels, 3)),
         copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         modal=np.zeros((modes, 6)), transition=vectors(own, whole(own)), turned=vectors(own, whole(own)),
+        kept=np.zeros((states, states)), kept_mean=np.zeros(states),
         variances=np.zeros(states), felt=np.zeros(channels), fault=np.zeros(6), pulls=np.zeros(n), evidence=np.zeros(1),
         row=vectors(states), gain=vectors(states), gains=vectors(4, 4, states), driving=vectors(n, states), offsets=np.zeros(n),
         rows=vectors(9, states), likely=np.zeros(6),
