@@ -6,7 +6,7 @@ import math
 
 from ..kernels.jit import inner, kernel
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y
-from .channels import READS_COORDINATE
+from .channels import POINT_ZERO, READS_COORDINATE
 from .estimate_row import (
     ACCELERATION,
     ACCELERATION_COVARIANCE,
@@ -103,15 +103,39 @@ def add_scene_doubt(p, f, live, out):
         if is_first and p.sites[channel.site].section == n - 1 and not (f.masked[c] or f.masked[c + 1]):
             left, x, y = f.rows[1], f.mean[ESTIMATE, at], f.mean[ESTIMATE, at + 1]
             clear(left, 6)
-            left[0] = x * x + f.spread[ESTIMATE, at, at]
-            left[1] = x * y + f.spread[ESTIMATE, at, at + 1]
-            left[3] = y * y + f.spread[ESTIMATE, at + 1, at + 1]
             add_section_errors(p, f, live, n if channel.site == 0 else n - 1, left)
+            xx, xy = x * x + f.spread[ESTIMATE, at, at], x * y + f.spread[ESTIMATE, at, at + 1]
+            add_shown(measured, left, xx, xy, y * y + f.spread[ESTIMATE, at + 1, at + 1])
             if left[0] + left[3] < measured[0] + measured[3]:
                 for i in range(6):
                     measured[i] = left[i]
     for i in range(6):
         out[i] += measured[i]
+
+
+@inner
+def add_shown(every, left, xx, xy, yy):
+    """Add to the triangle `left` of sections behind a point what it shows of those before; it is off by Z = (xx, xy; xy, yy).
+
+    The sections before have the covariance S = `every` - `left` of x, y and angle. The point shows x and y up to its zero, and
+    so the angle B (x, y) with
+
+        B = S_a (S_xy + POINT_ZERO^2 I)^-1,
+
+    of which the variance S_aa - B S_a^T is unknown. The tip's angle has B Z B^T + S_aa - B S_a^T, and B Z with x and y.
+    """
+    zero2 = POINT_ZERO * POINT_ZERO
+    s_xx, s_xy, s_yy = every[0] - left[0] + zero2, every[1] - left[1], every[3] - left[3] + zero2
+    s_ax, s_ay, determinant = every[2] - left[2], every[4] - left[4], s_xx * s_yy - s_xy * s_xy
+    b_x, b_y = (s_ax * s_yy - s_ay * s_xy) / determinant, (s_ay * s_xx - s_ax * s_xy) / determinant
+    to_x, to_y = b_x * xx + b_y * xy, b_x * xy + b_y * yy
+    unknown = every[5] - left[5] - b_x * s_ax - b_y * s_ay
+    left[0] += xx
+    left[1] += xy
+    left[2] += to_x
+    left[3] += yy
+    left[4] += to_y
+    left[5] += b_x * to_x + b_y * to_y + unknown
 
 
 @kernel
