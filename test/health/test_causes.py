@@ -444,6 +444,8 @@ def test_a_fault_comes_and_goes():
     begun, ended = taken(twins, 120)
     assert (begun.channel, begun.cause, begun.kind, begun.since) == ("cylinder_2", "cylinder_2.k", "softer", 20 * SECOND)
     assert "k -30 % (+- " in begun.evidence
+    ((kind, size, spread, unit),) = begun.ranked[0].parts
+    assert (kind, size, unit) == ("softer", pytest.approx(0.3), "") and 0.02 <= spread < 0.03
     assert (ended.cause, ended.since, ended.until) == ("cylinder_2.k", begun.since, 60 * SECOND)
     assert twins.alarms == []
 
