@@ -72,9 +72,10 @@ def add_doubt(p, f, out):
             continue
         column_row(p, p.readings, i, 1.0, f.row)
         usual2 = ANGLE_ZERO * ANGLE_ZERO + variance_of(f.row, f.spread[PREDICTION], f.gain, zero_place(p))
-        fault = FAULT_CHANCE / FAULT * math.exp(-0.5 * (apart / FAULT) ** 2)
-        usual = math.exp(-0.5 * apart * apart / usual2) / math.sqrt(usual2)
-        share = fault / (usual + 2.0 * fault) * (apart / p.slope[i]) ** 2
+        log_odds = (
+            0.5 * (apart / FAULT) ** 2 - 0.5 * apart * apart / usual2 + math.log(FAULT / (FAULT_CHANCE * math.sqrt(usual2)))
+        )
+        share = (apart / p.slope[i]) ** 2 / (math.exp(min(log_odds, 500.0)) + 2.0)
         add_square(out, share, p.readings[2 + i, n : n + 3])
 
 

@@ -27,7 +27,6 @@ from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import log_ndtr
 
 from ..config.settings import Settings
 from ..deviation.sensors import DOF
@@ -190,6 +189,8 @@ class Evidence:
 
     def _above(self, sizes: Array, ratio: Array) -> Array:
         """Return how much more probable sizes are above the least ones than they were before; logarithm of the factor."""
+        from scipy.special import log_ndtr  # not at the start of every twin
+
         means, deviations = sizes * ratio / (1.0 + ratio), self._sizes / np.sqrt(1.0 + ratio)
         above, below = log_ndtr((means - self._least) / deviations), log_ndtr((-means - self._least) / deviations)
         after = np.where(self._is_signed, np.logaddexp(above, below) - math.log(2.0), above)

@@ -116,7 +116,7 @@ def test_the_estimate_takes_the_angle_in_the_place_of_a_stroke_transducer_that_j
         samples.append(Sample(Stream.STROKES, k * STEP, lengths))
         samples.append(Sample(Stream.ANGLES, k * STEP + 200_000, rest.joints + np.radians(0.01) * rng.normal(size=N)))
     twin = Twin(SCENE, health=True, causes=False)
-    reports = [each for sample in samples for each in twin.update(sample).all]
+    reports = [twin.update(sample) for sample in samples]
     found = [each.estimate for each in reports if each.estimate is not None]
     away = np.array([each.tip[:2] - rest.tip for each in found])
     sigmas = np.sqrt([each.tip_covariance[[0, 3]] for each in found])
