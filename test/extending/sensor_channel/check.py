@@ -58,7 +58,7 @@ for sample in samples:
     found += [residuals for residuals in report.residuals if residuals.stream is INCLINATION]
 assert {residuals.names for residuals in found} == {(CHANNEL,)} and len(found) == count
 values, ratios = (np.array([getattr(residuals, part)[0] for residuals in found]) for part in ("values", "normalised"))
-assert np.abs(values - WRONG).max() < 6e-4 and ratios.min() > 5.0
+assert np.abs(values - WRONG).max() < 6e-4 and ratios[count // 2 :].min() > 5.0  # once the motion is known
 looked = watch.look({}, "", {stream: Peers(name) for stream, name in names.items()}, (), now)
 statuses = {status.name: status.message for status in looked}
 assert statuses[f"sensor {CHANNEL}"] == "measuring"
