@@ -100,7 +100,7 @@ def commission(
     Raise BagError if the session cannot be read, is of another boom, or its messages do not name all cylinders; UsageError if
     scene or mapping have faults.
     """
-    most_lag = 0.08  # s, largest lag that the twin's filter is left to estimate
+    most_lag = 0.08  # s, largest lag that the filter is left to estimate
     session = scan(Path(bag))
     own, given = scene_of(session.path, scene), None if mapping is None else Path(mapping)
     joints = len(own.scene.joints)
@@ -133,7 +133,13 @@ def commission(
         sensing = topics.noise_of(settings), mounts, False, reads, topics.absent
         twin = Twin(own.scene, *sensing, places=topics.places, lagging=topics.lagging)
         lags = _lags(twin, session, topics, window, found)
-        lags |= {stream: Lag(clock.lag, clock.lag_sigma) for stream, clock in twin.clocks.items()}  # of `delay: auto`
+        near = [stream for stream, lag in lags.items() if abs(lag.lag) < most_lag and lag.sigma < math.inf]
+        for _ in range(2):  # the second pass estimates lags of late streams only; the others give the time
+            twin = Twin(own.scene, *sensing, places=topics.places, lagging=dict.fromkeys([*topics.lagging, *near]))
+            for block in _samples(session, topics, window, joints):
+                twin.take(block)
+            lags |= {stream: Lag(clock.lag, clock.lag_sigma) for stream, clock in twin.clocks.items() if stream in lags}
+            near = [stream for stream in near if is_late(lags[stream])]
         for stream, lag in lags.items():
             if is_late(lag) and stream not in topics.lagging:
                 delay = round(topics.inputs[stream].delay + lag.lag, 3)
