@@ -11,7 +11,7 @@ from boom_twin import Scene
 from boom_twin.analysis.equilibrium import Equilibrium
 from boom_twin.analysis.undeflected import UndeflectedBoom
 from boom_twin.compiler.compile import compile_scene
-from boom_twin.plots.boom import draw_base, draw_cylinder, draw_link, draw_pin, draw_section, named_pins, section_parts
+from boom_twin.plots.boom import draw_base, draw_cylinder, draw_link, draw_pin, draw_section, section_parts
 from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture, side_view
 from boom_twin.scene.kinematics import Skeleton, joint_angles_of_strokes, skeleton
 from boom_twin.types import Array
@@ -29,7 +29,7 @@ def draw_boom(axes: Any, scene: Scene, bones: Skeleton, alpha: float = 0.55) -> 
         draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, part.cylinder.closed_length, 0.22 * size)
         for corners, colour in zip(joint.links, (GREEN, PURPLE), strict=False):
             draw_link(axes, corners, colour, 3.0)
-        for pin in named_pins(joint).values():
+        for pin in joint.named.values():
             draw_pin(axes, pin, 4.0)
     draw_base(axes, bones.pivots[0], size)
     draw_base(axes, bones.joints[0].barrel_pin, 0.5 * size)
@@ -79,7 +79,7 @@ def _detail(axes: Any, scene: Scene, bones: Skeleton) -> None:
     i = len(bones.joints) // 2
     joint = bones.joints[i]
     draw_boom(axes, scene, bones)
-    pins = list(named_pins(joint).values())
+    pins = list(joint.named.values())
     low, high = np.min(pins, axis=0), np.max(pins, axis=0)
     middle, reach = 0.5 * (low + high), 0.58 * float(max(high - low)) + scene.sections[i].depth
     axes.set(xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + 0.8 * np.array([-reach, reach]))
