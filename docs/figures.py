@@ -52,9 +52,8 @@ def sheet(path: Path, title: str, panels: list[tuple[Range, Range]], height: flo
 
 def draw_pins(axes: Any, joint: JointPins) -> None:
     """All pins of a joint."""
-    for pin in (joint.pivot, joint.barrel_pin, joint.rod_pin, joint.d, joint.e, joint.q):
-        if pin is not None:
-            draw_pin(axes, pin, 9.0)
+    for pin in joint.named.values():
+        draw_pin(axes, pin, 9.0)
 
 
 def stroke_lines(axes: Any, joint: JointPins, closed: float, shift: float, at: float = 0.5) -> None:
@@ -102,18 +101,18 @@ def joint_a_figure(scene: Scene, path: Path) -> None:
     with sheet(path, title, [((-1.45, 2.0), (-1.6, 0.98))], 8.0) as (axes,):
         draw_section(axes, section_parts(scene, bones, 0), scene.sections[0].depth)
         draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, scene.joints[0].cylinder.closed_length, 0.1)
-        draw_base(axes, joint.pivot, 0.24)
+        draw_base(axes, joint.named["the pivot"], 0.24)
         draw_base(axes, joint.barrel_pin, 0.18)
-        frame(axes, joint.pivot, 0.0, 0.62, ("x", "y"), BLUE)
+        frame(axes, joint.named["the pivot"], 0.0, 0.62, ("x", "y"), BLUE)
         draw_pins(axes, joint)
         axes.plot([0.7, 1.35], [0.0, 0.0], color=GREY, linewidth=0.9, linestyle=(0, (4, 3)))
-        angle(axes, joint.pivot, 0.0, phi, 1.2, "joint_1 (+)", ORANGE)
-        leader(axes, joint.pivot, "base.pivot", (-95, 34))
+        angle(axes, joint.named["the pivot"], 0.0, phi, 1.2, "joint_1 (+)", ORANGE)
+        leader(axes, joint.named["the pivot"], "base.pivot", (-95, 34))
         leader(axes, joint.barrel_pin, "base.cylinder_pin", (150, -26))
         leader(axes, joint.rod_pin, "rod_pin", (-46, 80))
         stroke_lines(axes, joint, scene.joints[0].cylinder.closed_length, -0.3)
-        span(axes, joint.pivot, joint.barrel_pin, "cylinder_pin[0] − pivot[0]", -1.54, at=-0.95)
-        span(axes, joint.pivot, joint.barrel_pin, "cylinder_pin[1] − pivot[1]", -0.9, across=True)
+        span(axes, joint.named["the pivot"], joint.barrel_pin, "cylinder_pin[0] − pivot[0]", -1.54, at=-0.95)
+        span(axes, joint.named["the pivot"], joint.barrel_pin, "cylinder_pin[1] − pivot[1]", -0.9, across=True)
         name(axes, bones.point(0, 1.45), "section 1", (0, 0), weight="normal")
 
 
@@ -123,7 +122,7 @@ def six_bar_figure(scene: Scene, i: int, phi: float, path: Path) -> None:
     angles[i] = phi
     bones = skeleton(scene, angles)
     joint, kind = bones.joints[i], scene.joints[i].kind
-    x, y = joint.pivot
+    x, y = joint.named["the pivot"]
     told = {"B1": "the rod pin is Q", "B2": "the rod pin is on link L", "B3": "the rod pin is on link R"}[kind]
     panels = [((x - 1.5, x + 0.62), (y - 0.46, y + 0.52)), ((x - 0.34, x + 0.42), (y - 0.34, y + 0.48))]
     with sheet(path, f"Joint {i + 1}, kind {kind}: {told}", panels, 5.3) as (whole, close):
@@ -151,44 +150,44 @@ def _stroke(joint: JointPins, part: Joint) -> float:
 def _whole(axes: Any, scene: Scene, bones: Skeleton, i: int) -> None:
     """Sections, cylinder, and the angle."""
     joint, part = bones.joints[i], scene.joints[i]
-    x, y = joint.pivot
+    x, y = joint.named["the pivot"]
     stroke_lines(axes, joint, part.cylinder.closed_length, 0.12, 1.0 + 0.1 / _stroke(joint, part))
-    frame(axes, joint.pivot, 0.0, 0.26, ("x", "y"), BLUE)
+    frame(axes, joint.named["the pivot"], 0.0, 0.26, ("x", "y"), BLUE)
     axes.plot([x + 0.3, x + 0.48], [y, y], color=GREY, linewidth=0.9, linestyle=(0, (4, 3)))
-    angle(axes, joint.pivot, 0.0, float(bones.headings[i]), 0.42, f"joint_{i + 1} (−)", ORANGE)
+    angle(axes, joint.named["the pivot"], 0.0, float(bones.headings[i]), 0.42, f"joint_{i + 1} (−)", ORANGE)
     name(axes, np.array([x - 0.62, y]), f"section {i}", (0, 0), weight="normal")
     name(axes, bones.point(i, 0.56), f"section {i + 1}", (0, 0), weight="normal")
     name(axes, joint.barrel_pin, "C", (12, 20))
-    name(axes, joint.pivot, "pivot", (-8, -24))
-    span(axes, joint.barrel_pin, joint.pivot, "C[0] (−)", y - 0.34)
-    span(axes, joint.pivot, joint.barrel_pin, "C[1]", joint.barrel_pin[0] - 0.12, across=True)
+    name(axes, joint.named["the pivot"], "pivot", (-8, -24))
+    span(axes, joint.barrel_pin, joint.named["the pivot"], "C[0] (−)", y - 0.34)
+    span(axes, joint.named["the pivot"], joint.barrel_pin, "C[1]", joint.barrel_pin[0] - 0.12, across=True)
 
 
 def _links(axes: Any, joint: JointPins, phi: float) -> None:
     """Pins D, E, Q and the lengths of the links."""
-    assert joint.d is not None and joint.e is not None and joint.q is not None
-    y = joint.pivot[1]
-    frame(axes, joint.pivot, 0.0, 0.3, ("x", ""), BLUE)
-    frame(axes, joint.pivot, phi, 0.3, ("x'", "y'"), INK)
+    assert joint.named["D"] is not None and joint.named["E"] is not None and joint.named["Q"] is not None
+    y = joint.named["the pivot"][1]
+    frame(axes, joint.named["the pivot"], 0.0, 0.3, ("x", ""), BLUE)
+    frame(axes, joint.named["the pivot"], phi, 0.3, ("x'", "y'"), INK)
     across = np.array([-np.sin(phi), np.cos(phi)])
-    foot = joint.e - across * float((joint.e - joint.pivot) @ across)
-    dimension(axes, joint.pivot, foot, "E[0]", -0.12)
-    dimension(axes, foot, joint.e, "E[1]", -0.115, at=1.62)
-    span(axes, joint.d, joint.pivot, "D[0] (−)", y - 0.24, at=-0.62)
-    span(axes, joint.pivot, joint.d, "D[1] (−)", joint.d[0] - 0.06, across=True, at=2.1)
-    name(axes, joint.d, "D", (11, -10))
-    name(axes, joint.e, "E", (14, 8))
-    name(axes, joint.q, "Q = rod pin" if joint.kind == "B1" else "Q", (14, 12) if joint.kind != "B3" else (16, -2))
-    name(axes, 0.55 * joint.d + 0.45 * joint.q, "lL", (0, 0), GREEN)
-    name(axes, 0.5 * (joint.e + joint.q), "lR", (0, 0), PURPLE)
+    foot = joint.named["E"] - across * float((joint.named["E"] - joint.named["the pivot"]) @ across)
+    dimension(axes, joint.named["the pivot"], foot, "E[0]", -0.12)
+    dimension(axes, foot, joint.named["E"], "E[1]", -0.115, at=1.62)
+    span(axes, joint.named["D"], joint.named["the pivot"], "D[0] (−)", y - 0.24, at=-0.62)
+    span(axes, joint.named["the pivot"], joint.named["D"], "D[1] (−)", joint.named["D"][0] - 0.06, across=True, at=2.1)
+    name(axes, joint.named["D"], "D", (11, -10))
+    name(axes, joint.named["E"], "E", (14, 8))
+    name(axes, joint.named["Q"], "Q = rod pin" if joint.kind == "B1" else "Q", (14, 12) if joint.kind != "B3" else (16, -2))
+    name(axes, 0.55 * joint.named["D"] + 0.45 * joint.named["Q"], "lL", (0, 0), GREEN)
+    name(axes, 0.5 * (joint.named["E"] + joint.named["Q"]), "lR", (0, 0), PURPLE)
 
 
 def _rod_pin(axes: Any, joint: JointPins) -> None:
     """How R is measured: along its link, then to the left of it."""
     if joint.kind == "B1":
         return
-    assert joint.d is not None and joint.e is not None and joint.q is not None
-    start, stop = (joint.d, joint.q) if joint.kind == "B2" else (joint.q, joint.e)
+    assert joint.named["D"] is not None and joint.named["E"] is not None and joint.named["Q"] is not None
+    start, stop = (joint.named["D"], joint.named["Q"]) if joint.kind == "B2" else (joint.named["Q"], joint.named["E"])
     along = (stop - start) / np.hypot(*(stop - start))
     foot = start + along * float((joint.rod_pin - start) @ along)
     axes.plot(*np.array([foot, joint.rod_pin]).T, color=INK, linewidth=1.3, linestyle=(0, (4, 3)), zorder=9)
@@ -223,13 +222,17 @@ def side_figure(scene: Scene, i: int, phi: float, path: Path) -> None:
 
 def _side(axes: Any, joint: JointPins, told: str, up: float) -> None:
     """The arrow from D to E, and names; `up` is 1 where the links are above the section, -1 where they are below."""
-    assert joint.d is not None and joint.e is not None and joint.q is not None
+    assert joint.named["D"] is not None and joint.named["E"] is not None and joint.named["Q"] is not None
     look = {"arrowstyle": "-|>", "color": ORANGE, "linewidth": 2.2, "shrinkA": 0, "shrinkB": 4, "mutation_scale": 20}
-    axes.annotate("", tuple(joint.e), tuple(joint.d), arrowprops=look, zorder=11)
-    for point, text, offset in ((joint.d, "D", (-16, -14)), (joint.e, "E", (15, -6)), (joint.q, "Q", (0, 18))):
+    axes.annotate("", tuple(joint.named["E"]), tuple(joint.named["D"]), arrowprops=look, zorder=11)
+    for point, text, offset in (
+        (joint.named["D"], "D", (-16, -14)),
+        (joint.named["E"], "E", (15, -6)),
+        (joint.named["Q"], "Q", (0, 18)),
+    ):
         name(axes, point, text, (offset[0], up * offset[1]))
     name(axes, joint.barrel_pin, "C", (0, up * 20))
-    name(axes, joint.pivot + np.array([-0.45, -up * 0.35]), told, (0, 0), ORANGE)
+    name(axes, joint.named["the pivot"] + np.array([-0.45, -up * 0.35]), told, (0, 0), ORANGE)
 
 
 def lengths_figure(scene: Scene, path: Path) -> None:
