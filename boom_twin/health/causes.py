@@ -110,6 +110,11 @@ class Evidence:
         Smallest size of a fault that is told, over that.
     named : collection of str
         Causes of named faults: their sizes may grow or shrink.
+
+    Attributes
+    ----------
+    sure : float
+        Logarithm of the odds that a name needs.
     """
 
     def __init__(
@@ -122,7 +127,7 @@ class Evidence:
         named: Collection[str] = (),
     ) -> None:
         self._odds, self._faults = settings.name_odds, tuple(faults)
-        self._sure = math.log(settings.name_odds / (1.0 - settings.name_odds))
+        self.sure = math.log(settings.name_odds / (1.0 - settings.name_odds))
         self._needed = np.full(len(faults), NONE)  # evidence below which a fault is left out
         self._is_size = np.array([fault.is_size for fault in faults])
         sized = [fault for fault in faults if fault.is_size]
@@ -145,7 +150,7 @@ class Evidence:
 
         `likelihoods` (1 + faults,) in nats, the boom as believed first; `found` of the faults that are sizes.
         """
-        bounded = np.maximum(INDEPENDENT * likelihoods, INDEPENDENT * likelihoods.max() - self._sure)
+        bounded = np.maximum(INDEPENDENT * likelihoods, INDEPENDENT * likelihoods.max() - self.sure)
         self._gains.append(self._gains[-1] + (bounded[1:] - bounded[0])[~self._is_size])
         steady = np.linalg.inv(np.eye(len(self._sizes)) + found.information @ self._unsteady)
         self._sums.append(Scores(*(old + steady @ new for old, new in zip(self._sums[-1], found, strict=True))))
@@ -198,7 +203,7 @@ class Evidence:
 
     def postpone(self, place: int, evidence: float) -> None:
         """Leave out a sensor or a lag whose size is not sure until its evidence has grown by what a name needs."""
-        self._needed[place] = evidence + self._sure
+        self._needed[place] = evidence + self.sure
 
 
 def likeliest(size: float, least: float, course: Callable[[float], Array]) -> Likeliest | None:

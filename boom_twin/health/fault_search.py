@@ -67,7 +67,6 @@ class FaultSearch:
         threads: int = 1,  # among which the twins are shared
     ) -> None:
         self._scene, self._make, self._settings, self._reads = scene, make, settings, reads
-        self._sure = math.log(settings.name_odds / (1.0 - settings.name_odds))
         self._cores = ThreadPoolExecutor(threads, "fault twins")  # twins do not depend on each other
         self._recent: deque[Second] = deque(maxlen=MEMORY)
         self._change: Change | None = None
@@ -203,10 +202,10 @@ class FaultSearch:
         found = {place: each for place, trial in faults.items() if (each := self._sized(trial, begin)) is not None}
         likely = {place: each[3] for place, each in found.items()}
         if verdict.place not in found or any(
-            likely[verdict.place] - each < self._sure for place, each in likely.items() if place != verdict.place
+            likely[verdict.place] - each < self._decision.sure for place, each in likely.items() if place != verdict.place
         ):
             if fault.is_size:
-                self._unsure[verdict.place] = verdict.evidence + self._sure
+                self._unsure[verdict.place] = verdict.evidence + self._decision.sure
             else:
                 self._decision.postpone(verdict.place, verdict.evidence)
             return []
@@ -276,7 +275,7 @@ class FaultSearch:
         if found is None:
             return None
         spread = math.hypot(found.spread, usual)
-        is_known = abs(found.size) > self._certain * spread and found.half > self._sure
+        is_known = abs(found.size) > self._certain * spread and found.half > self._decision.sure
         return (fault._replace(size=found.size), spread, onset + found.onset * SECOND, found.probability) if is_known else None
 
     def _course(self, fault: Fault, onset: int) -> Array:
