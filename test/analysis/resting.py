@@ -20,14 +20,14 @@ class Resting:
     forces: np.ndarray
 
 
-def at_rest(scene, posture, longer=0.0):
-    """Plan, state and scratch of a scene at a posture's strokes, all cylinders' drives `longer` (m, scalar or (n,))."""
-    return rest_at(scene, strokes_of_posture(scene, posture) + longer, posture_angles(scene, posture))
+def at_rest(scene, posture):
+    """Plan, state and scratch of a scene at a posture's strokes."""
+    return rest_at(scene, strokes_of_posture(scene, posture), posture_angles(scene, posture))
 
 
-def resting(scene, posture, longer=0.0):
-    """`Resting` of a scene, arguments as of `at_rest`."""
-    plan, state, _ = at_rest(scene, posture, longer)
+def resting(scene, posture):
+    """`Resting` of a scene in a posture."""
+    plan, state, _ = at_rest(scene, posture)
     found = taken_apart(plan, first_row(plan, state))
     offsets = found.pins[:, 0] + 1j * found.pins[:, 1]
     sizes = found.pins[:, 2]

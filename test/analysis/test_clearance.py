@@ -1,4 +1,4 @@
-"""A boom at rest on pins with clearance, and its small vibrations: levers, the oracle's pins, limits on ideal pins."""
+"""A boom at rest on pins with clearance, and its small vibrations: the oracle, the work of a unit load, ideal pins as limit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import pytest
 from analysis.resting import resting
 from oracle import booms
 from oracle.clearance import rigid
-from oracle.clearance.free_play import lengthening, tip_shift
 from oracle.clearance.scenes import PINS, RADII, RODS, with_pins
 from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
@@ -21,7 +20,6 @@ from boom_twin.validation.contact_law import Contact, stiffness
 POSTURES = ["horizontal", "arch", "high", "low"]
 DOCUMENT = booms.document()
 LOAD = 0.5  # kg, of payload, for the change of a pin's force with the load
-BARRELS = tuple(f"cylinder_{i}.barrel" for i in range(1, 5))
 IDEAL = booms.scene_of(DOCUMENT)
 
 
@@ -31,42 +29,12 @@ def bush(pin, clearance):
     return Contact(k, 0.0, clearance, smoothing=SMOOTH)
 
 
-def held(document, headings, index, tension):
-    """Axis of cylinder `index` (complex, m) and force of the bush on its rod's and on its barrel's pin (complex, N)."""
-    oil = freed(document, headings, index, None).cylinder
-    barrel, rod = geometry.pins(document, headings, index)
-    axis, gravity = rod - barrel, geometry.gravity(document)
-    on_rod = oil.holding(abs(axis), np.angle(axis), tension, gravity)
-    return axis, on_rod, -on_rod - (oil.barrel_mass + oil.rod_mass) * gravity
-
-
-def loaded_lever(posture, index, step=1e-5):
-    """How the resting tip of the ideal boom moves by the length of a drive: complex, m/m."""
-    one = step * (np.arange(4) == index)
-    return (resting(IDEAL, posture, one).tip - resting(IDEAL, posture, -one).tip) / (2.0 * step)
-
-
-@pytest.mark.parametrize("posture", POSTURES)
-@pytest.mark.parametrize("pin", RODS + BARRELS)
-def test_tip_shift_is_lever_times_clearance_and_penetration(posture, pin):
-    """Levers of the boom under its load: its beams and its oil give way as the play moves it."""
-    index, ideal = int(pin[9]) - 1, resting(IDEAL, posture)
-    axis, on_rod, on_barrel = held(DOCUMENT, np.cumsum(ideal.joints), index, ideal.tension[index])
-    force, axis = (on_rod, axis) if pin.endswith("rod") else (on_barrel, -axis)
-    shift = resting(with_pins(DOCUMENT, [pin]), posture).tip - ideal.tip
-    play, lever = lengthening(bush(pin, 1e-4), force, axis), loaded_lever(posture, index)
-    assert abs(lever * play - shift) < 0.01 * abs(shift)
-    if abs((force * axis.conjugate()).real) > 0.99 * abs(force * axis):  # along the cylinder: it carries more than itself
-        rigid_lever = geometry.levers(DOCUMENT, np.cumsum(ideal.joints))[index]
-        assert abs(rigid_lever) == pytest.approx(abs(lever), rel=0.06)
-
-
 @pytest.mark.parametrize("posture, index", [*product(POSTURES, range(4))])
 def test_rigid_boom_rests_as_the_oracle_has_it(posture, index):
-    """Tip, force and offset of a rod's pin in a boom with one oil spring; levers of its geometry give the shift within 2 %."""
+    """Tip, force and offset of a rod's pin in a boom with one oil spring."""
     document, contact = rigid.document(4, index), bush(RODS[index], 1e-4)
     headings, pin = np.radians(document["postures"][posture]), f"cylinder_{index + 1}.rod"
-    found, ideal = resting(with_pins(document, [pin]), posture), resting(booms.scene_of(document), posture)
+    found = resting(with_pins(document, [pin]), posture)
     drive = geometry.cylinder_length(document, headings, index)
     expected = freed(document, headings, index, contact).rest(drive, headings[index])
     smoothed = 0.5 * SMOOTH**2 / 1e-4  # r = sqrt(|delta|^2 + s^2) is longer than |delta| by this
@@ -75,10 +43,6 @@ def test_rigid_boom_rests_as_the_oracle_has_it(posture, index):
     assert abs(found.tip - expected.tip) < 60.0 * smoothed
     assert found.tension[index] == pytest.approx(expected.tension, rel=1e-5, abs=0.1)
     assert abs(found.forces[0] + expected.force) < 1e-4 * abs(expected.force) + 1.0
-    if (posture, index) != ("low", 3):  # it carries little but its own cylinder
-        shift = found.tip - ideal.tip
-        estimate = tip_shift(document, np.cumsum(ideal.joints), index, contact, expected.force)
-        assert abs(estimate - shift) < 0.02 * abs(shift)
 
 
 @pytest.mark.parametrize("posture", POSTURES[:2])

@@ -1,4 +1,4 @@
-"""The model's own law of a pin as the oracle's mechanisms ask for one: `pin_contact.bearing` behind complex numbers."""
+"""The model's law of a pin, run as Python for one journal."""
 
 from __future__ import annotations
 
@@ -31,19 +31,3 @@ def memory(entry=None, force=0.0):
 def bearing(row, kept, x, y, vx, vy, turning=0.0, rate=0.0, axis=(1.0, 0.0)):
     """`contact.bearing` with the velocity at the start of the step equal to that at its end."""
     return contact.pin_force(row, kept, contact.Journal(x, y, vx, vy, vx, vy, turning, *axis), rate)
-
-
-class Journal:
-    """The oracle's `Contact` by the model's law: contact begins within NEAR of the rim."""
-
-    def __init__(self, row):
-        self.row = row
-
-    def gap(self, offset):
-        """m: negative in flight."""
-        return abs(offset) - self.row.gap + contact.NEAR
-
-    def force(self, offset, rate, entry):
-        """Force (N) of the bush on the pin, complex."""
-        fx, fy, *_ = bearing(self.row, memory(entry), offset.real, offset.imag, rate.real, rate.imag)
-        return -complex(fx, fy)

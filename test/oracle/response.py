@@ -1,14 +1,10 @@
-"""Dense frequency response, all unknowns in one complex solve: of the finite-segment boom, and of the model's own equations."""
+"""Frequency response of the finite-segment boom: all unknowns in one complex solve."""
 
 from __future__ import annotations
 
 import numpy as np
-from kernels.dense import Dense, slopes
 from oracle import segments
 from reference.segments.geometry import oil_stiffness
-
-from boom_twin.kernels.elements.cylinder import compliance_and_lag
-from boom_twin.kernels.tables import Motion
 
 
 class SegmentResponse:
@@ -60,41 +56,3 @@ def extrapolated(scene, angles, frequencies, load, coarse=2):
     """`SegmentResponse.rows` with Richardson extrapolation from `coarse` and twice that."""
     a, b = (SegmentResponse(scene, fineness, angles).rows(frequencies, load) for fineness in (coarse, 2 * coarse))
     return b + (b - a) / 3.0
-
-
-class DenseModel:
-    """The model's equations without any condensing (`kernels.dense`), linearised at rest: K, D, M of all unknowns."""
-
-    GAIN, RATE = 1e4, 1e2  # 1/s^2, 1/s; about those of the highest frequency
-
-    def __init__(self, plan, z, drive):
-        self.plan, still, at_rest = plan, np.zeros(plan.joints), Motion(0.0, 0.0, *np.zeros((2, len(plan.masses))))
-        rows = plan.tables.cylinders
-        self.lags = np.array([compliance_and_lag(row, plan.tables.oils, at)[1] for row, at in zip(rows, drive, strict=True)])
-
-        def of_drive(drives):
-            return np.asarray(Dense(plan, at_rest, drives, still).residual(z), float)
-
-        steps = 1e-6 * np.eye(plan.joints)
-        self.by_drive = np.array([(of_drive(drive - h) - of_drive(drive + h)) / 2e-6 for h in steps])
-        dense = Dense(plan, Motion(0.0, 0.0, np.zeros(len(plan.masses)), np.zeros(len(plan.masses))), drive, still)
-        position = dense.positions(z)[: len(plan.masses)].copy()
-
-        def tangent(gain, rate):
-            dense.motion = Motion(gain, rate, position, -rate * position)
-            return np.array(list(slopes(dense.residual, z))).T
-
-        self.stiffness = tangent(0.0, 0.0)
-        self.mass = (tangent(self.GAIN, 0.0) - self.stiffness) / self.GAIN
-        self.damping = (tangent(0.0, self.RATE) - self.stiffness) / self.RATE
-        self.tip = np.array(list(slopes(dense.positions, z))).T[plan.tables.tip : plan.tables.tip + 2]
-
-    def unknowns(self, frequencies, load):
-        """Amplitudes (k, unknowns) under a `load` (2 + n,): force at the tip, drives."""
-        cylinders, found, load = self.plan.tables.cylinders, [], np.asarray(load)
-        for s in 2j * np.pi * np.asarray(frequencies):
-            right = self.tip.T.astype(complex) @ load[:2]
-            right += load[2:] @ self.by_drive
-            right[cylinders.z] += self.lags * s * load[2:]
-            found.append(np.linalg.solve(self.stiffness + s * self.damping + s**2 * self.mass, right))
-        return np.array(found)
