@@ -35,7 +35,7 @@ def rebound(contact, mass, speed, tolerance=1e-10):
         rates, lambda time, state: state, [-height, speed], np.array([0.0, lasting]), tolerance,
         np.array([tolerance * deepest, tolerance * speed]), method="DOP853",
     )  # fmt: skip
-    return -found.states[-1, 1] / speed
+    return -found[-1, 1] / speed
 
 
 def restitution(hysteresis):

@@ -1,4 +1,4 @@
-"""The oracle of worn pins: dropped balls, geometry, rest, and a boom on one pin against Lagrange's equations."""
+"""The oracle of worn pins: dropped balls, rest, and a boom on one pin against Lagrange's equations."""
 
 from __future__ import annotations
 
@@ -32,34 +32,6 @@ def test_integration_meets_the_closed_form(law, e, exponent, mass, speed):
 
 
 POSTURES = ["horizontal", "arch", "high", "low"]
-
-
-@pytest.mark.parametrize("posture", POSTURES)
-def test_lengths_meet_the_finite_segments(posture):
-    document = booms.document()
-    headings = np.radians(document["postures"][posture])
-    expected = segments.Segments(booms.scene_of(document), 0).lengths(np.diff(headings, prepend=0.0))
-    found = [geometry.cylinder_length(document, headings, i) for i in range(4)]
-    assert found == pytest.approx(expected, abs=1e-12)
-
-
-@pytest.mark.parametrize("index", range(4))
-def test_derivatives_of_a_part(index):
-    document, step = booms.document(), 1e-5
-    headings = np.radians(document["postures"]["arch"])
-    part = freed(document, headings, index, None).part
-    phi = headings[index]
-    before, here, after = (part.at(phi + side) for side in (-step, 0.0, step))
-    assert (after.inertia - before.inertia) / (2 * step) == pytest.approx(here.slope, rel=1e-6, abs=1e-4)
-    assert (after.height - before.height) / (2 * step) == pytest.approx(here.moments, rel=1e-7)
-    assert (after.pin.value - before.pin.value) / (2 * step) == pytest.approx(here.pin.first, rel=1e-7)
-    assert (after.pin.first - before.pin.first) / (2 * step) == pytest.approx(here.pin.second, rel=1e-6)
-    tips = [part.tip_at(phi + side) for side in (-step, step)]
-    lengths = [abs(p.pin.value - geometry.pins(document, headings, index)[0]) for p in (before, after)]
-    lever = (tips[1] - tips[0]) / (lengths[1] - lengths[0])
-    assert geometry.levers(document, headings)[index] == pytest.approx(lever, rel=1e-6)
-
-
 RADII = (0.030, 0.025, 0.025, 0.020)
 
 
@@ -102,11 +74,7 @@ def test_nothing_accelerates_at_rest(posture, index, smoothing):
 HEADINGS = np.array([0.5, -0.3])
 
 
-def bush_of(law="lankarani-nikravesh", restitution=0.9, smoothing=0.0):
-    return Contact(STEEL, HYSTERESIS[law](restitution), 1e-4, smoothing=smoothing)
-
-
-# the six-bar has the same contact as the slider-crank; its geometry is in test_geometry, its flights against the model in
+# the six-bar has the same contact as the slider-crank; its flights against the model are in
 # test_clearance_motion
 @pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_stiff_pin_without_play_moves_as_lagrange_has_it(count):
@@ -137,14 +105,14 @@ def test_energy(law, loses):
     """Thrown up out of rest, undamped oil, sharp contact: Hertz keeps the energy, the others never gain any."""
     document = rigid.document(1, 0)
     del document["joints"][0]["cylinder"]["d"]
-    boom = freed(document, HEADINGS[:1], 0, bush_of(law, 0.8))
+    boom = freed(document, HEADINGS[:1], 0, Contact(STEEL, HYSTERESIS[law](0.8), 1e-4))
     drive = geometry.cylinder_length(document, HEADINGS[:1], 0)
     found = boom.follow(lambda time: (drive, 0.0), boom.rest(drive, 0.5), np.linspace(0.0, 0.06, 2001), rate=0.3)
     distance = np.hypot(*found.offset.T)
     depth, n = np.maximum(distance - boom.contact.clearance, 0.0), boom.contact.exponent
     total = found.energy + boom.contact.stiffness * depth ** (n + 1.0) / (n + 1.0)
     moving = 0.5 * boom.part.at(0.5).inertia * 0.3**2
-    assert len(found.episodes) >= 2
+    assert np.count_nonzero(np.diff(depth > 0.0)) >= 2, "it leaves the bush, and hits it again"
     if loses:
         assert np.diff(total).max() < 1e-5 * moving
         assert total[0] - total[-1] > 1e-3 * moving

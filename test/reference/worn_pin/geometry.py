@@ -1,4 +1,4 @@
-"""Geometry of the reference boom with a worn pin: pins, cylinder lengths, levers, link angles with derivatives.
+"""Geometry of the reference boom with a worn pin: pins, cylinder lengths, link angles with derivatives.
 
 Axes of the head before, origin in the pivot. With a = lL e^(i L), b = lR e^(i R), e = E e^(i phi):
 
@@ -135,23 +135,6 @@ def cylinder_length(document: Document, headings: Headings, index: int) -> float
     """Return the length of cylinder `index`, pin to pin, m."""
     barrel, rod = pins(document, headings, index)
     return abs(rod - barrel)
-
-
-def levers(document: Document, headings: Headings, step: float = 1e-5) -> Complexes:
-    """Return the tip's travel per metre of each cylinder, the others held: complex, shape (n,), by central differences.
-
-    To first order this times (clearance + penetration) is the tip's shift by the play of a pin that lies on its side: a
-    pulled cylinder acts as if longer by that, a pushed one as if shorter.
-    """
-    found = []
-    for index in range(len(headings)):
-        turned = [np.array(headings, dtype=float) for _ in range(2)]
-        turned[0][index:] -= step
-        turned[1][index:] += step
-        tips = [pivots(document, h)[-1] for h in turned]
-        lengths = [cylinder_length(document, h, index) for h in turned]
-        found.append((tips[1] - tips[0]) / (lengths[1] - lengths[0]))
-    return np.array(found)
 
 
 def outboard(document: Document, headings: Headings, index: int) -> Mass:

@@ -29,7 +29,7 @@ from boom_twin.validation.contact_law import Contact
 from . import geometry
 from .bodies import Lever, OilCylinder, SixBar
 from .geometry import Document, Point, dot
-from .impacts import ContactMotion, Episode, follow
+from .impacts import follow
 
 NEAR = 0.05  # rad, about the guess
 PASSES = 40
@@ -56,22 +56,14 @@ LONGEST = 1e-2  # s, step
 
 @dataclass(frozen=True)
 class PinMotion:
-    """A motion in m rows.
+    """A motion in m rows: tip and offset of the pin in the bush (m), each (m, 2).
 
-    Tip (m), its acceleration (m/s^2), offset of the pin in the bush (m), force of the bush on the pin (N), each (m, 2).
-
-    `phi`, `tension` (N, of the oil) and `energy` (J, oil, weight and motion, without that of the contact): (m,).
+    `energy` (J, oil, weight and motion, without that of the contact): (m,).
     """
 
-    times: np.ndarray
     tip: np.ndarray
-    acceleration: np.ndarray
     offset: np.ndarray
-    force: np.ndarray
-    phi: np.ndarray
-    tension: np.ndarray
     energy: np.ndarray
-    episodes: list[Episode]
 
 
 @dataclass(frozen=True)
@@ -100,20 +92,23 @@ class PinnedBoom:
         rest: Rest,
         times: np.ndarray,
         breaks: Sequence[float] = (),
-        tolerance: float = 1e-8,
-        method: str = "LSODA",
         rate: float = 0.0,
     ) -> PinMotion:
         """Motion from an equilibrium, `rate` of phi in rad/s, to ascending `times` (s); `breaks`: of the drive."""
         # states are deviations from the rest, so that a relative tolerance means something
-        zero = np.array([rest.phi, rest.length, rest.psi, 0.0, 0.0, 0.0])
-        found = follow(
+        zero, tolerance = np.array([rest.phi, rest.length, rest.psi, 0.0, 0.0, 0.0]), 1e-8
+        deviations = follow(
             lambda time, state, entry: self.rates(drive(time), zero + state, entry),
             lambda time, state: self.gap(zero + state),
             [0.0, 0.0, 0.0, rate, 0.0, 0.0], times, tolerance, tolerance * np.repeat([1e-5, 1e-2], 3),
-            breaks, LONGEST, method,
+            breaks, LONGEST, "LSODA",
         )  # fmt: skip
-        return self._rows(drive, found, zero + found.states)
+        states = zero + deviations
+        return PinMotion(
+            _pairs([self.part.tip_at(state[0]) for state in states]),
+            _pairs([self.pin(state)[0] for state in states]),
+            np.array([self.energy(drive(time)[0], state) for time, state in zip(times, states, strict=True)]),
+        )
 
     def rates(self, drive: tuple[float, float], state: np.ndarray, entry: float | None) -> list[float]:
         """Derivative of (phi, l, psi, phi', l', psi') at length and rate of the drive."""
@@ -168,27 +163,6 @@ class PinnedBoom:
     def _pin(self, length: float, u: complex, turn: float, speed: float, swing: float, bush: Point) -> tuple[complex, complex]:
         rate = (speed + 1j * length * swing) * u - bush.first * turn
         return self.cylinder.pin + length * u - bush.value, rate
-
-    def _rows(self, drive: Drive, found: ContactMotion, states: np.ndarray) -> PinMotion:
-        pins = [self.pin(state) for state in states]
-        entries = [None if np.isnan(entry) else entry for entry in found.entries]
-        drives = [drive(time) for time in found.times]
-        both = list(zip(states, drives, strict=True))
-        return PinMotion(
-            found.times,
-            _pairs([self.part.tip_at(state[0]) for state in states]),
-            _pairs([self._tip_acceleration(*row) for row in zip(drives, states, entries, strict=True)]),
-            _pairs([offset for offset, _ in pins]),
-            _pairs([self._bush.force(*pin, entry) for pin, entry in zip(pins, entries, strict=True)]),
-            states[:, 0],
-            np.array([self.cylinder.tension(state[1], state[4], at) for state, at in both]),
-            np.array([self.energy(at[0], state) for state, at in both]),
-            found.episodes,
-        )
-
-    def _tip_acceleration(self, drive: tuple[float, float], state: np.ndarray, entry: float | None) -> complex:
-        arm = self.part.tip_at(state[0]) - self.part.pivot
-        return complex((1j * self.rates(drive, state, entry)[3] - state[3] ** 2) * arm)
 
 
 def _pairs(values: Sequence[complex]) -> np.ndarray:
