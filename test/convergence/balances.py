@@ -160,13 +160,10 @@ class EnergyBalance:
     """Energy balance of a motion; energies in J."""
 
     work: float  # done by the drives and by a force at the tip
-    change: float  # kinetic and potential energy at the last row less that at the first
     damping: float  # taken by beams, oil dampers and the base's hinge
     contact: float  # taken by contacts
-    gap: float  # largest of work - change - damping - contact at any step, in magnitude
-    left: float  # that difference at the end: what time integration took, negative if it gave
+    gap: float  # largest of work less change of energy, damping and contact at any step, in magnitude
     moved: float  # measure of `gap`: the largest of that work, kinetic energy, and change of the weight's energy
-    step: float  # longest step, s
 
     @property
     def share(self) -> float:
@@ -180,16 +177,16 @@ def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
     first, heavy = energies.total(start), energies.weight(start)
     course.work.load[:] = course.first_load
     before, sums = energies.powers(start) + tip_power(course, start), np.zeros(3)
-    gap, left, moved, longest = 0.0, 0.0, energies.kinetic(start), 0.0
+    gap, moved = 0.0, energies.kinetic(start)
     for step, state in states_of(course, dt):
         now = energies.powers(state) + tip_power(course, state)
         sums += 0.5 * step * (before + now)
-        before, longest = now, max(longest, step)
-        left = float(sums[0] - sums[1] - sums[2] - (energies.total(state) - first))
-        gap = max(gap, abs(left))
+        before = now
+        left = sums[0] - sums[1] - sums[2] - (energies.total(state) - first)
+        gap = max(gap, abs(float(left)))
         moved = max(moved, abs(sums[0]), energies.kinetic(state), abs(energies.weight(state) - heavy))
     work, damping, lost = sums.tolist()
-    return EnergyBalance(work, work - damping - lost - left, damping, lost, gap, left, float(moved), longest)
+    return EnergyBalance(work, damping, lost, gap, float(moved))
 
 
 def tip_power(course: DriveCourse, state: State) -> Array:

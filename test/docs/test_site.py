@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,6 @@ import pytest
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.slow
 pytest.importorskip("mkdocs", reason="mkdocs is not installed: pip install .[docs]")
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install .[test]")
-CHROMIUM = Path("/usr/bin/chromium")
 
 ELSEWHERE = r"(?:https?:)?//[^\s)>]*"
 BY_ELEMENT = rf"<(?:script|img|iframe|source|video|audio|embed)\b[^>]*?\bsrc(?:set)?=[\"']?\s*{ELSEWHERE}"
@@ -54,15 +51,6 @@ def test_every_module_has_its_place_in_the_reference(site: Path) -> None:
             assert f'id="{name}"' in pages, name
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
-@pytest.mark.skipif(not CHROMIUM.is_file(), reason="chromium is not there (Debian: apt-get install chromium)")
 def test_opened_as_files_it_asks_for_nothing_and_can_be_searched(site: Path, browser: Any) -> None:
     page = browser.new_page(viewport={"width": 1280, "height": 900})
     asked, failed = [], []

@@ -20,9 +20,6 @@ from monitor.conftest import MonitorProcess, monitoring
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.texts import FILE, LANGUAGES
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install .[test]")
-CHROMIUM = Path("/usr/bin/chromium")
-pytestmark = pytest.mark.skipif(not CHROMIUM.is_file(), reason="chromium is not there (Debian: apt-get install chromium)")
 PATIENCE = 240_000  # ms
 FAULT = 25.0  # s, when encoder 3 is known to be wrong
 TABS = ("traces", "spectrum", "shape", "state", "path")
@@ -32,14 +29,6 @@ TABS = ("traces", "spectrum", "shape", "state", "path")
 def monitor(faulty: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[MonitorProcess]:
     with monitoring(tmp_path_factory.mktemp("monitor") / "log", "--bag", str(faulty)) as process:
         yield process
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
-        yield browser
-        browser.close()
 
 
 def opened(browser: Any, monitor: MonitorProcess, width: int, height: int, **options: Any) -> Any:

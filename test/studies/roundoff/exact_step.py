@@ -11,7 +11,7 @@ import numpy as np
 from kernels.dense import riccati_pass
 from scipy import linalg
 
-from boom_twin import Scene, UsageError
+from boom_twin import Scene
 from boom_twin.analysis.equilibrium import set_undeformed
 from boom_twin.analysis.methods import FAMILIES
 from boom_twin.compiler.compile import compile_scene
@@ -33,8 +33,6 @@ ROUNDS = 12  # of equilibration, and most of refinement
 class StepRoundoff:
     """Round-off in one step of a boom: relative errors of the tip's increment by each way of solving."""
 
-    unknowns: int
-    condition: float  # of the whole equilibrated system, in the 1-norm
     riccati: float  # error of the sweep
     plain: float  # error of the plain product, NaN if it gave no increment
     dense: float  # error of LU of the whole
@@ -47,9 +45,10 @@ def digits(error: float) -> float:
 
 
 def one_step(scene: Scene, angles: np.ndarray, step: float, rho: float) -> StepRoundoff:
-    """Compare on a boom at rest at joint `angles` (rad), undeformed, that gravity begins to move; step in s."""
-    if scene.base.stiffness is not None:
-        raise UsageError("base.stiffness: the dense solver knows a rigid base only. Leave it out.")
+    """Compare on a boom at rest at joint `angles` (rad), undeformed, that gravity begins to move; step in s.
+
+    The base is rigid.
+    """
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     set_undeformed(plan, state, angles)
@@ -67,8 +66,6 @@ def one_step(scene: Scene, angles: np.ndarray, step: float, rho: float) -> StepR
         return float(np.linalg.norm(tip @ (increments - exact)) / np.linalg.norm(tip @ exact))
 
     return StepRoundoff(
-        len(plan.names),
-        system.condition(),
         error(_increments(plan, state, work, motion, _riccati)),
         error(_increments(plan, state, work, motion, _plain)),
         error(system.first),
@@ -127,8 +124,7 @@ class _System:
         double = self.moved.astype(float)
         whole = double.T @ (self.mass.astype(float)[:, None] * double) + self.rest.astype(float)
         self.scale = _equilibrated(whole)
-        self.whole = whole * np.outer(self.scale, self.scale)
-        self.factors = linalg.lu_factor(self.whole)
+        self.factors = linalg.lu_factor(whole * np.outer(self.scale, self.scale))
         self.first = self._solved(self.load.astype(float))
 
     def solve(self) -> tuple[np.ndarray, float]:
@@ -142,12 +138,6 @@ class _System:
                 break
             x, change = x + more, now
         return np.asarray(x), change
-
-    def condition(self) -> float:
-        """Return the condition number, estimated from the factors."""
-        norm = np.abs(self.whole).sum(axis=0).max()
-        inverse, _ = linalg.lapack.dgecon(self.factors[0], norm)
-        return float(1.0 / inverse) if inverse > 0.0 else math.inf
 
     def _solved(self, right: np.ndarray) -> np.ndarray:
         with warnings.catch_warnings():
