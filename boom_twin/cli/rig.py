@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from argparse import Action, ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from .. import __version__
 from ..errors import UsageError
@@ -67,16 +68,17 @@ def _refuse_unrecorded(causes: list[str], given: str, recorded: set[Stream]) -> 
 
 def _mapping_text(places: Mapping[str, Place], cylinders: Sequence[tuple[float, float]]) -> str | None:
     """Return the mapping that places these sensors; None without any."""
+    from ..config.yaml_text import whole_text
+
     if not (places or cylinders):
         return None
-    lines: dict[str, list[str]] = {"inputs": [], "sensors": []}
-    for name, p in places.items():
-        block = "sensors" if name.startswith("moment_") else "inputs"
-        lines[block].append(f"  {name}: {{place: {{section: {p.section}, at: {p.at}, turned: {p.turned}}}}}")
+    blocks: dict[str, dict[str, Any]] = {"inputs": {}, "sensors": {}}
+    for name, place in places.items():
+        blocks["sensors" if name.startswith("moment_") else "inputs"][name] = {"place": asdict(place)}
     if cylinders:
         bore, rod = map(list, zip(*cylinders, strict=True))
-        lines["inputs"].append(f"  cylinder_pressures: {{bore: {bore}, rod: {rod}}}")
-    return "\n".join(line for block, found in lines.items() if found for line in (f"{block}:", *found)) + "\n"
+        blocks["inputs"]["cylinder_pressures"] = {"bore": bore, "rod": rod}
+    return whole_text({name: block for name, block in blocks.items() if block})
 
 
 def _cylinders(text: str | None, scene: Scene) -> list[tuple[float, float]]:

@@ -33,11 +33,11 @@ class SummaryDisplay:
         return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
 
 
-def numbers(values: Any, factor: float = 1.0, digits: int = 4) -> str:
-    """Return numbers as text with `digits` significant digits, separated by commas."""
+def numbers(values: Any, factor: float = 1.0) -> str:
+    """Return numbers as text with four significant digits, separated by commas."""
     values = values.tolist() if hasattr(values, "tolist") else values
     values = values if isinstance(values, Iterable) else [values]
-    return ", ".join(f"{factor * value:.{digits}g}" for value in values)
+    return ", ".join(f"{factor * value:.4g}" for value in values)
 
 
 def data_frame(columns: Mapping[str, Any]) -> Any:
