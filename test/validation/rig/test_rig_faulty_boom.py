@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from default_boom import parameter_names
+from oracle import booms
 
 pytest.importorskip("exudyn")
 
@@ -23,7 +24,7 @@ def ratios(changed: Scene, scene: Scene) -> dict[str, float]:
     return {name: parameter(changed, name) / parameter(scene, name) for name in names}
 
 
-def test_faults_add_to_what_is_there(cantilever):
+def test_faults_add_to_what_is_there():
     scene = with_faults(load_scene(), [parse("tip.payload:more:60"), parse("line_fill:more:2")])
     more = with_faults(scene, [parse("tip.payload:more:5"), parse("joint_1.sensor:bias:1")])
     less = with_faults(scene, [parse("tip.payload:less:20"), parse("line_fill:less:2")])
@@ -34,7 +35,7 @@ def test_faults_add_to_what_is_there(cantilever):
     assert first.at == "cylinder_2.rod" and first.radial_clearance == 5e-4
     assert second.radial_clearance == pytest.approx(7e-4)
     with pytest.raises(UsageError, match=r"cylinder_1\.k: the scene has no such parameter"):
-        with_faults(Scene.model_validate(cantilever), [parse("cylinder_1.k:softer:0.3")])
+        with_faults(booms.scene_of(booms.one_rigid()), [parse("cylinder_1.k:softer:0.3")])
 
 
 CAUSES = ["cylinder_2.k:softer:0.4", "section_3.EI:softer:0.4", "tip.payload:more:20", "line_fill:more:2"]
