@@ -1,4 +1,4 @@
-"""The twin's motion, which starts in its equilibrium, against the Exudyn rig on booms that neither was made for."""
+"""The twin's equilibrium and motion against the Exudyn rig on booms that neither was made for."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin import simulate
+from boom_twin import simulate, statics
 from boom_twin.scene.kinematics import stroke_range
 from boom_twin.validation import rig
 from boom_twin.validation.rig.motion import RANGE_SAMPLES
@@ -22,6 +22,15 @@ def rms(vectors):
 def seeds(first, usual, last):
     """Random booms of 1 to 5 sections in turn: those below `usual` each time, the others in the long run."""
     return [pytest.param(seed, marks=[] if seed < usual else pytest.mark.slow) for seed in range(first, last)]
+
+
+@pytest.mark.parametrize("seed", seeds(0, 10, 25))
+def test_equilibrium(random_boom):
+    scene, strokes = random_boom
+    expected, found = rig.statics(scene, strokes, elements=32), statics(scene, strokes)
+    assert np.linalg.norm(found.tip - expected["tip"]) < 1e-3 * np.linalg.norm(expected["tip"] - found.tip_rigid)
+    assert found.joints == pytest.approx(expected["joints"], abs=1e-5)
+    assert found.cylinder_forces == pytest.approx(expected["forces"], rel=1e-4)
 
 
 @pytest.mark.parametrize("seed", seeds(1, 8, 15))
