@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from io import StringIO
 from pathlib import Path, PureWindowsPath
 from typing import Any
@@ -155,6 +156,11 @@ def offered_qos(qos: Qos) -> list[dict[str, Any]]:
     ]
 
 
+@cache
+def _offered_text(qos: Qos) -> str:
+    return dump(offered_qos(qos))
+
+
 _RELIABILITY = {1: "reliable", 2: "best_effort", "reliable": "reliable", "best_effort": "best_effort"}
 _DURABILITY = {1: "transient_local", 2: "volatile", "transient_local": "transient_local", "volatile": "volatile"}
 
@@ -204,7 +210,7 @@ class Recorded:
     @classmethod
     def offered(cls, topic: str, type_name: str, definition: str, qos: Qos, type_hash: str) -> Recorded:
         """Return a topic offered with `qos`. Its channel keeps the QoS and the hash of the type, as in rosbag2."""
-        details = {"offered_qos_profiles": dump(offered_qos(qos)), "topic_type_hash": type_hash}
+        details = {"offered_qos_profiles": _offered_text(qos), "topic_type_hash": type_hash}
         return cls(topic, type_name, definition.encode(), details, offered_qos(qos), type_hash)
 
     @property

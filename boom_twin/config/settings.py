@@ -67,7 +67,7 @@ def _dotted(values: Any, block: str = "") -> Iterator[tuple[str, Any]]:
 class _Table(BaseModel):
     """Table of settings. A value out of bounds or unknown raises UsageError."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     @model_validator(mode="wrap")
     @classmethod

@@ -186,7 +186,7 @@ def correct(x, covariance, row, gains, innovation, variance, size):
     return expected
 
 
-@inner
+@kernel
 def gain_after(covariance, row, gains, count, size):
     """Write gain `count`, the covariance of all states with the reading of `row`; return the variance of that reading.
 
@@ -206,7 +206,7 @@ def subtract(gain, share, other, size):
         gain[i] -= share * other[i]
 
 
-@inner
+@kernel
 def take_innovation(x, covariance, gains, count, innovation, expected, size):
     """Correct a state by an innovation of variance `expected`, and divide its gain by the root; return how many gains are left.
 

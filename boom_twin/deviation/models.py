@@ -308,7 +308,7 @@ def doubt_estimate(p, f, size):
         take_prediction(p, f, 0.5)
 
 
-@inner
+@kernel
 def take_prediction(p, f, share):
     """Give the prediction a `share` of the probability of the estimate; of a share of 1 the estimate is the prediction.
 

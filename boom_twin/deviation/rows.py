@@ -18,7 +18,7 @@ def clear(row, size):
         row[k] = 0.0
 
 
-@inner
+@kernel
 def read(row, x, size):
     """Return the reading of a row; four sums, because each waits for its last addition."""
     one = two = three = four = 0.0

@@ -117,7 +117,7 @@ class Template:
         """Return the offset of a field in the first message, by its index among the doubles; -1 is the last field."""
         return ORIGIN + 8 * int(self.double_places[double])
 
-    def fill(self, stamps: Integers, doubles: Array, singles: Sequence[float] = ()) -> list[Bytes]:
+    def fill(self, stamps: Integers, doubles: Array, singles: Array | None = None) -> list[Bytes]:
         """Return the bytes of each message, a row for each of the stamps.
 
         `doubles` (k, d) are in the order of the placeholders; `singles`, of ``float32``, are the same in every row.
@@ -128,7 +128,7 @@ class Template:
         body.view("<f8")[:, self.double_places] = doubles
         times = np.array(np.divmod(stamps, SECOND))
         body.view("<i4")[:, self._stamp_places] = times[self._stamp_parts].T
-        if singles:
+        if singles is not None:
             body.view("<f4")[:, self._single_places] = singles
         return [rows[:, span] for span in self._spans]
 

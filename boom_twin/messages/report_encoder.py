@@ -68,9 +68,9 @@ class ShapeMarkers:
         if self._template is None:
             self._template = self._new_template(len(line), len(pins))
         numbers = np.concatenate([part.ravel() for part in (line, large, label, straight, pins, prediction.tip_position)])
-        colours = [value for force in prediction.cylinder_forces for value in force_colour(float(force) / self._scale)]
+        colours = force_colours(prediction.cylinder_forces / self._scale)
         self._extend_trace(prediction.stamp, prediction.tip_position)
-        (data,) = self._template.fill(np.array([prediction.stamp]), numbers, colours)
+        (data,) = self._template.fill(np.array([prediction.stamp]), numbers, colours.ravel())
         return self._with_trace(data.tobytes())
 
     def _new_template(self, points: int, cylinders: int) -> Template:
@@ -126,13 +126,11 @@ class ShapeMarkers:
         return marker
 
 
-def force_colour(share: float) -> Colour:
-    """Return the colour of a cylinder: grey at `share` 0, red at 1 (tension), blue at -1 (compression), pale grey for NaN."""
-    if share != share:
-        return GHOST
-    end = TENSION if share > 0.0 else COMPRESSION
-    red, green, blue = (NO_FORCE + min(abs(share), 1.0) * (end - NO_FORCE)).tolist()
-    return red, green, blue, 1.0
+def force_colours(shares: Array) -> Array:
+    """Return colours (n, 4) of cylinders: grey at a share of 0, red at 1 (tension), blue at -1 (compression), pale for NaN."""
+    shares = shares[:, None]
+    colours = NO_FORCE + np.minimum(abs(shares), 1.0) * (np.where(shares > 0.0, TENSION, COMPRESSION) - NO_FORCE)
+    return np.where(np.isnan(shares), GHOST, np.hstack([colours, np.ones_like(shares)]))
 
 
 OK, WARN, ERROR = range(3)
@@ -286,8 +284,8 @@ class ReportEncoder:
     def _shaped_joint_states(self, stamps: Integers, numbers: Array) -> Bytes:
         """Return joint states with passive joints, which come with a shape, from numbers, shape (k, all)."""
         joints = numbers[:, JOINTS : JOINTS + len(self._chain.lengths)]
-        passive = np.array([self._passive.positions(row) for row in joints]).reshape(len(stamps), len(self._passive.names))
-        return self._shaped_joints.fill(stamps, np.concatenate([numbers[:, self._joints], passive], axis=1))[0]
+        places = np.concatenate([numbers[:, self._joints], self._passive.positions(joints)], axis=1)
+        return self._shaped_joints.fill(stamps, places)[0]
 
     def _residual_rows(self, residuals: ResidualBlock) -> Iterator[tuple[Integers, Bytes]]:
         """Yield rows of the block and their messages of residuals, one stream after the other."""

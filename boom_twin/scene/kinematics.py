@@ -186,18 +186,18 @@ class PassiveJoints:
         self.names = tuple(name.format(i) for i, own in enumerate(kinds, start=1) for name in own)
 
     def positions(self, angles: Array) -> Array:
-        """Return the angles (rad, from -pi to pi) in the order of `names`, at relative joint `angles` (rad), shape (n,).
+        """Return the angles (rad, from -pi to pi) in the order of `names`, at relative joint `angles` (rad), shape (.., n).
 
         A barrel and link L are measured in the section before (the base for joint 1), link R in its own section. NaN where
         the links do not close.
         """
         found = []
-        for (kind, row), phi in zip(self._joints, angles, strict=True):
+        for (kind, row), phi in zip(self._joints, np.ascontiguousarray(np.moveaxis(angles, -1, 0)), strict=True):
             pins = _pins_at(kind, row, phi)
             found.append(np.angle(pins[rod_pin_of(pins)] - pins[barrel_pin_of(pins)]))
             if "Q" in pins:
                 found += [np.angle(pins["Q"] - pins["D"]), np.angle((pins["Q"] - pins["E"]) * np.exp(-1j * phi))]
-        return np.array(found)
+        return np.stack(found, axis=-1)
 
 
 def plain(row: np.record) -> SimpleNamespace:

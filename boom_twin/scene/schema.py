@@ -42,7 +42,7 @@ GEOMETRIC = "true or false, whether flexible parts have geometric stiffness"
 class Part(BaseModel):
     """Base of all parts: frozen, unknown keys refused."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
 
 class Material(Part):

@@ -12,7 +12,7 @@ from drive_twin import drive_twin
 from ros_messages import Output, decoded, stamp_of
 
 from boom_twin import Sample, Stream, load_scene
-from boom_twin.messages.report_encoder import TRACE, ShapeMarkers, force_colour
+from boom_twin.messages.report_encoder import TRACE, ShapeMarkers, force_colours
 from boom_twin.predictions import Prediction
 
 FACTOR, FULL = 7.5, 5.0e4  # N
@@ -74,12 +74,13 @@ def test_every_message_draws_the_boom_in_the_same_markers(predictions: list[Pred
         label = message["boom_exaggerated", 1]
         assert label.text == "displacements x 7.5"
         assert np.hypot(label.pose.position.x - large[-1, 0], label.pose.position.z - large[-1, 1]) < 1.0
+        colours = force_colours(prediction.cylinder_forces / FULL)
         for i, joint in enumerate(scene.joints):
             cylinder, force = message["cylinders", i + 1], prediction.cylinder_forces[i]
             ends, colour = points(cylinder), cylinder.color
             free = joint.cylinder.closed_length + prediction.strokes[i]
             assert np.hypot(*(ends[1] - ends[0])) == pytest.approx(free + force / joint.cylinder.k, abs=2e-4)
-            assert (colour.r, colour.g, colour.b, colour.a) == pytest.approx(force_colour(force / FULL), abs=1e-7)
+            assert (colour.r, colour.g, colour.b, colour.a) == pytest.approx(colours[i], abs=1e-7)
             assert (colour.r > colour.b) == (force > 0.0)  # red in tension
         np.testing.assert_allclose(points(message["cylinders", 1])[0], scene.base.cylinder_pin)
         past = [p.tip_position for p in predictions[: k + 1] if p.stamp >= prediction.stamp - TRACE]
