@@ -63,15 +63,16 @@ class Likeliest(NamedTuple):
     """Most likely size of a fault.
 
     spread : standard deviation of the sizes without each second (jackknife), which holds where the model is inexact. onset :
-    number of the first second. probability : log posterior probability density, up to a constant of all faults. half : gain of
-    half the size. The likelihood of a fault rises up to its size; that of a twin that opens another valve may jump.
+    number of the first second. probability : log posterior probability density, up to a constant of all faults. bounded : gain
+    of log likelihood, of which no second counts more than a name needs: most seconds must agree. In violent moves a valve that
+    a twin opens may decide a second.
     """
 
     size: float
     spread: float
     onset: int
     probability: float
-    half: float
+    bounded: float
 
 
 class Scores(NamedTuple):
@@ -206,7 +207,7 @@ class Evidence:
         self._needed[place] = evidence + self.sure
 
 
-def likeliest(size: float, least: float, course: Callable[[float], Array]) -> Likeliest | None:
+def likeliest(size: float, least: float, sure: float, course: Callable[[float], Array]) -> Likeliest | None:
     """Return the most likely size by twins of larger and smaller sizes, until the likelihood falls on both sides.
 
     Parameters
@@ -215,6 +216,8 @@ def likeliest(size: float, least: float, course: Callable[[float], Array]) -> Li
         First trial, and the standard deviation that sizes have before anything is read.
     least : float
         Where to end if smaller sizes are ever more likely.
+    sure : float
+        Gain of a second that counts at most.
     course : callable
         Size -> log likelihood of each second since a possible onset, shape (k,).
 
@@ -247,4 +250,5 @@ def likeliest(size: float, least: float, course: Callable[[float], Array]) -> Li
         without = 0.5 * np.diff(slopes + 2.0 * curves * change, append=0.0) / (curves[0] + np.diff(curves, append=0.0))
     found = sizes[best] + change
     probability = INDEPENDENT * float(gains[best][first]) - 0.5 * (found / size) ** 2
-    return Likeliest(found, float(np.linalg.norm(without)), first, probability, INDEPENDENT * float(gained(0.5 * found)[first]))
+    agreed = np.clip(INDEPENDENT * (course(found) - healthy)[first:], -sure, sure).sum()
+    return Likeliest(found, float(np.linalg.norm(without)), first, probability, float(agreed))
