@@ -261,7 +261,7 @@ class FaultSearch:
     def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float, int, float] | None:
         """Return a fault of the most likely size, its deviation, its onset, not before `onset` (ns), and its log posterior.
 
-        None if the size is not surely above that of healthy booms, if most seconds do not agree, or if a force's is
+        None if the size is not surely above that of healthy booms, if too few seconds agree, or if a force's is
         below the set deviation.
         """
         usual = usual_size(self._scene, fault, self._settings.scene_error)
@@ -276,7 +276,7 @@ class FaultSearch:
         if found is None:
             return None
         spread = math.hypot(found.spread, usual)
-        is_known = abs(found.size) > self._certain * spread and found.bounded > sure
+        is_known = abs(found.size) > self._certain * spread and found.agreement > math.sqrt(2.0 * sure)
         return (fault._replace(size=found.size), spread, onset + found.onset * SECOND, found.probability) if is_known else None
 
     def _course(self, fault: Fault, onset: int) -> Array:

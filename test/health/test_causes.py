@@ -113,7 +113,7 @@ def test_evidence_is_the_ratio_of_likelihoods_of_gaussian_readings():
     assert found.evidence == pytest.approx(math.log(np.mean([factor(onset) for onset in range(8)])), abs=0.02)
 
 
-def test_most_seconds_must_agree_on_a_size():
+def test_seconds_must_agree_on_a_size():
     """A softer spring is 3 nats a second likelier at its own size, and less likely at half of it: vibration out of phase.
 
     The same gain of 20 s in a single second, such as by a valve that a twin opens, counts as one.
@@ -125,7 +125,7 @@ def test_most_seconds_must_agree_on_a_size():
     even, jump = np.full(20, 5.0), np.where(np.arange(20) == 9, 160.0, 0.0)
     found = [likeliest(0.25, 0.06, math.log(19.0), course(gains)) for gains in (even, jump)]
     assert all(each.size == pytest.approx(0.35, abs=0.02) and each.probability > 10.0 for each in found)
-    assert found[0].bounded == pytest.approx(20 * INDEPENDENT * 3.0, rel=0.1) and found[1].bounded < 0.0
+    assert found[0].agreement == pytest.approx(math.sqrt(20)) and found[1].agreement < 0.0
     assert course(even)(0.18).sum() < course(even)(0.0).sum()
 
 
