@@ -177,6 +177,9 @@ class Settings(_Table):
     scene_error: float = setting(
         0.02, "1", {"ge": 0.0, "le": 0.3}, "relative standard deviation of the scene's stiffnesses and masses"
     )
+    expected_load: float = setting(
+        2.5e-3, "1", {"gt": 0.0, "le": 0.1}, "unknown force at the tip that the filter expects at first, over the boom's weight"
+    )
     payload: float = setting(-1.0, "kg", LOAD, "mass at the tip; below 0: that of the scene", True)
     line_fill: float = setting(-1.0, "kg/m", LOAD, "concrete in the pipe line; below 0: that of the scene", True)
     stroke_rate: float = setting(STROKE_RATE, "m/s", LIMIT, "maximum speed of a cylinder; faster strokes are left out", True)

@@ -40,7 +40,7 @@ from .tip_estimate import write_predicted_covariance
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 GAUGE_DRIFT = 0.03  # share of the moment in a root second, by which the zero of a strain gauge drifts
 WIDTH = 1e-6  # relative accuracy of natural frequencies
-USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 2.5e-3, 1e-4, 2e-3, 2e-2  # shares of the boom's weight, see `SensorNoise`
+LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 1e-4, 2e-3, 2e-2  # shares of the boom's weight, see `SensorNoise`
 FAILED_WAY, FAILED_RATE = 0.05, 0.02  # m, m/s: how far a drive is, and how fast, when its transducer is found to fail
 SWING, SPEED = 0.3, 0.05  # how far a boom at work swings, as a share of the tip's deflection; m/s of its cylinders
 
@@ -131,7 +131,7 @@ class BoomPredictor:
         mounting = mounting_of(self.plan, mounts)
         measured = measurement_of(self.plan, settings, mounting, places, lagging)
         self.posture = new_posture(self.plan, MODES, lengths, mounting, measured, reads, scene.base.inclination)
-        loads = [size * weight for size in (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)]
+        loads = [size * weight for size in (settings.expected_load, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)]
         noise = SensorNoise(settings.variance(SENSORS[reads.stream]), settings.scene_error, *loads)
         self.filters = new_filters(n, MODES, measured, noise)
         self.finder = RestFinder(scene, self.plan, self.posture, reads)

@@ -6,10 +6,14 @@ of its filter are linear in these sizes x,
     r = sum_i S_i x_i + e,    S_i = (r - r_i) / size_i,
 
 with r_i of the twin with fault i alone. A healthy boom has sizes, too: they are `Settings.scene_error`, all the time.
-Because no model of a moving boom is exact, they are `UNSTEADY` times that besides, anew in each second. A fault is a further
-size of one parameter from its onset on, of unknown amount. So for each onset its most likely size, the variance of that, and
-the factor by which it is more probable than no fault are in closed form (generalised likelihood ratio: A. Willsky and H. Jones,
-IEEE Trans. Automat. Control 21 (1976), 108-112). The evidence of a fault is the mean of that factor over all onsets.
+Because no model of a moving boom is exact, they are `UNSTEADY` times that besides, anew in each second. One of these sizes is
+the unknown load that the filter expects: if it expects too much, it follows noise, and a heavier boom, which it moves less,
+predicts better.
+
+A fault is a further size of one parameter from its onset on, of unknown amount. So for each onset its most likely size, the
+variance of that, and the factor by which it is more probable than no fault are in closed form (generalised likelihood ratio:
+A. Willsky and H. Jones, IEEE Trans. Automat. Control 21 (1976), 108-112). The evidence of a fault is the mean of that factor
+over all onsets.
 
 A sensor whose zero drifts, or a late stream, is no size. Each second gives its twin a gain: its log likelihood less that of the
 boom as believed, and less what errors of the scene explain. Its evidence is the mean over all onsets, too.
@@ -63,15 +67,17 @@ class Likeliest(NamedTuple):
     """Most likely size of a fault.
 
     spread : standard deviation of the sizes without each second (jackknife), which holds where the model is inexact. onset :
-    number of the first second. probability : log posterior probability density, up to a constant of all faults. half : gain of
-    half the size. The likelihood of a fault rises up to its size; that of a twin that opens another valve may jump.
+    number of the first second. probability : log posterior probability density, up to a constant of all faults. agreement :
+    sum of the gains of all seconds over the root of the sum of their squares. If gains are independent and symmetric about zero
+    it exceeds t with a probability below exp(-t^2/2) (B. Efron, J. Amer. Stat. Assoc. 64 (1969), 1278-1302). No gain counts
+    more than a name needs.
     """
 
     size: float
     spread: float
     onset: int
     probability: float
-    half: float
+    agreement: float
 
 
 class Scores(NamedTuple):
@@ -133,7 +139,7 @@ class Evidence:
         sized = [fault for fault in faults if fault.is_size]
         self._sizes, own = np.array([fault.size for fault in sized]), np.array(errors)[self._is_size]
         self._least, self._unsteady = certain * own, np.diag((UNSTEADY * own) ** 2)
-        self._is_fault = np.array([fault.kind != "heavier" for fault in sized], bool)
+        self._is_fault = np.array([fault.kind not in ("heavier", "quieter") for fault in sized], bool)
         self._is_signed = np.array(
             [fault.cause in named or (fault.kind == "more" and parameter(scene, fault.cause) > 0.0) for fault in sized], bool
         )
@@ -206,7 +212,7 @@ class Evidence:
         self._needed[place] = evidence + self.sure
 
 
-def likeliest(size: float, least: float, course: Callable[[float], Array]) -> Likeliest | None:
+def likeliest(size: float, least: float, sure: float, course: Callable[[float], Array]) -> Likeliest | None:
     """Return the most likely size by twins of larger and smaller sizes, until the likelihood falls on both sides.
 
     Parameters
@@ -215,6 +221,8 @@ def likeliest(size: float, least: float, course: Callable[[float], Array]) -> Li
         First trial, and the standard deviation that sizes have before anything is read.
     least : float
         Where to end if smaller sizes are ever more likely.
+    sure : float
+        Gain of a second that counts at most.
     course : callable
         Size -> log likelihood of each second since a possible onset, shape (k,).
 
@@ -247,4 +255,7 @@ def likeliest(size: float, least: float, course: Callable[[float], Array]) -> Li
         without = 0.5 * np.diff(slopes + 2.0 * curves * change, append=0.0) / (curves[0] + np.diff(curves, append=0.0))
     found = sizes[best] + change
     probability = INDEPENDENT * float(gains[best][first]) - 0.5 * (found / size) ** 2
-    return Likeliest(found, float(np.linalg.norm(without)), first, probability, INDEPENDENT * float(gained(0.5 * found)[first]))
+    own = np.clip(INDEPENDENT * (course(found) - healthy)[first:], -sure, sure)
+    return Likeliest(
+        found, float(np.linalg.norm(without)), first, probability, float(own.sum() / max(np.linalg.norm(own), TINY))
+    )

@@ -261,7 +261,7 @@ class FaultSearch:
     def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float, int, float] | None:
         """Return a fault of the most likely size, its deviation, its onset, not before `onset` (ns), and its log posterior.
 
-        None if the size is not surely above that of healthy booms, if half of it is not likelier than none, or if a force's is
+        None if the size is not surely above that of healthy booms, if too few seconds agree, or if a force's is
         below the set deviation.
         """
         usual = usual_size(self._scene, fault, self._settings.scene_error)
@@ -271,11 +271,12 @@ class FaultSearch:
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
             is_known = abs(changed.size) > max(least, self._certain * spread)
             return (changed, math.hypot(spread, drift), onset, 0.0) if is_known else None
-        found = likeliest(fault.size, self._certain * usual, lambda size: self._course(fault._replace(size=size), onset))
+        least, sure = self._certain * usual, self._decision.sure
+        found = likeliest(fault.size, least, sure, lambda size: self._course(fault._replace(size=size), onset))
         if found is None:
             return None
         spread = math.hypot(found.spread, usual)
-        is_known = abs(found.size) > self._certain * spread and found.half > self._decision.sure
+        is_known = abs(found.size) > self._certain * spread and found.agreement > math.sqrt(2.0 * sure)
         return (fault._replace(size=found.size), spread, onset + found.onset * SECOND, found.probability) if is_known else None
 
     def _course(self, fault: Fault, onset: int) -> Array:

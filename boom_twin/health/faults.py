@@ -21,14 +21,16 @@ from .sensor_check import Flags
 
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
 LATE = 0.02  # s, delay of the stamps of a stream
+QUIET = 0.4  # unknown force that the filter of a boom under less load expects, over the set one
 
 
 class Fault(NamedTuple):
     """Fault of a boom.
 
-    cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off``, ``late``, or
-    ``heavier`` of a section. size : relative loss, kg, kg/m, s, relative mass; or the change of a sensor's zero, rad, m/s^2 or
-    N. The hypothesis ``off`` lets the zero drift by any amount. is_told : False without an alarm: it competes for its effect.
+    cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off``, ``late``,
+    ``heavier`` of a section, or ``quieter``: less unknown force at the tip than the filter expects. size : relative loss, kg,
+    kg/m, s, relative mass; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis ``off`` lets the zero drift by any
+    amount. is_told : False without an alarm: it competes for its effect.
     """
 
     cause: str
@@ -44,7 +46,7 @@ class Fault(NamedTuple):
     @property
     def unit(self) -> str:
         """Unit of its size; empty of a share."""
-        if self.kind in ("softer", "heavier"):
+        if self.kind in ("softer", "heavier", "quieter"):
             return ""
         if self.channel == "tip":
             return "kg" if self.cause == "tip.payload" else "kg/m"
@@ -70,7 +72,8 @@ class Hypothesis(NamedTuple):
     """Boom with faults.
 
     scene : with its parameters changed. payload, line_fill : additional load, kg and kg/m. doubted : channels whose zeros may
-    drift by any amount. delays : delay of the stamps of a stream, s.
+    drift by any amount. delays : delay of the stamps of a stream, s. expects : unknown force that its filter expects, over the
+    set one.
     """
 
     scene: Scene
@@ -78,6 +81,7 @@ class Hypothesis(NamedTuple):
     line_fill: float = 0.0
     doubted: frozenset[str] = frozenset()
     delays: tuple[tuple[Stream, float], ...] = ()
+    expects: float = 1.0
 
     def load(self, payload: float, line_fill: float) -> dict[str, float]:
         """Return the load of this boom from a set load (kg, kg/m; below 0: that of the scene)."""
@@ -137,12 +141,15 @@ class Follower(Protocol):
 def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
     """Return the boom of a scene with these faults."""
     extra, doubted, delays = {"tip.payload": 0.0, "line_fill": 0.0}, set[str](), list[tuple[Stream, float]]()
+    expects = 1.0
     for cause, kind, size, _ in faults:
         if kind == "softer":
             parts = [name for name in parameter_names(scene) if name.endswith(".k")] if cause == "oil.k" else [cause]
             scene = with_parameters(scene, {name: (1.0 - size) * parameter(scene, name) for name in parts})
         elif kind == "heavier":
             scene = with_parameters(scene, {cause: (1.0 + size) * parameter(scene, cause)})
+        elif kind == "quieter":
+            expects = QUIET
         elif kind == "off":
             name, channels = cause.removesuffix(".sensor"), channels_of(len(scene.joints))
             doubted |= set(channels[Stream.IMU]) if name == "tip_imu" else {name}
@@ -150,15 +157,19 @@ def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
             delays.append((Stream(cause.removesuffix(".delay")), size))
         else:
             extra[cause] += size if kind == "more" else -size
-    return Hypothesis(scene, extra["tip.payload"], extra["line_fill"], frozenset(doubted), tuple(delays))
+    return Hypothesis(scene, extra["tip.payload"], extra["line_fill"], frozenset(doubted), tuple(delays), expects)
 
 
 def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
-    """Return all single faults that are compared for a boom; warm oil, which softens all cylinders, and masses are none."""
+    """Return all single faults that are compared for a boom.
+
+    Warm oil, which softens all cylinders, heavier sections, and a quiet tip are none, but explain readings.
+    """
     mass = explain(scene).mass
     found = [Fault(name, "softer", LOSS) for name in parameter_names(scene) if name.endswith((".k", ".EI", ".stiffness"))]
     found.append(Fault("oil.k", "softer", OIL_LOSS, False))
     found += [Fault(f"section_{i + 1}.mass", "heavier", LOSS, False) for i in range(len(scene.sections))]
+    found.append(Fault("tip.load", "quieter", 1.0, False))
     found.append(Fault("tip.payload", "more", LOAD * mass))
     found.append(Fault("line_fill", "more", 2.0 * LOAD * mass / scene.reach))
     names_of = channels_of(len(scene.joints))
@@ -175,6 +186,8 @@ def usual_size(scene: Scene, fault: Fault, error: float) -> float:
     """
     if fault.kind in ("softer", "heavier"):
         return error
+    if fault.kind == "quieter":
+        return 1.0
     if fault.kind == "off":  # a part that is wrong turns a joint as its sensor's zero would
         return ANGLE_ZERO if fault.channel.startswith("joint_") else 0.0
     if fault.kind == "late":

@@ -323,6 +323,7 @@ class SampleTaker:
 
 def _follower(kind: Any, settings: Settings, mounts: tuple[Mount | None, ...], sensors: Any, each: Hypothesis) -> Follower:
     """Return the fault twin of a hypothesis, of class `kind`."""
-    boom = each.scene, settings.tuned(each.load(*settings.load)), mounts
-    twin: Follower = kind(*boom, **sensors, doubted=each.doubted, is_follower=True)
+    own = settings.tuned(each.load(*settings.load))
+    own = own.model_copy(update={"expected_load": each.expects * own.expected_load})
+    twin: Follower = kind(each.scene, own, mounts, **sensors, doubted=each.doubted, is_follower=True)
     return twin

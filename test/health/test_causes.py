@@ -13,7 +13,7 @@ from scipy.stats import multivariate_normal, norm
 from boom_twin import load_scene
 from boom_twin.config.settings import Settings
 from boom_twin.deviation.states import Innovations
-from boom_twin.health.causes import INDEPENDENT, UNSTEADY, Evidence, Scores, scores
+from boom_twin.health.causes import INDEPENDENT, UNSTEADY, Evidence, Scores, likeliest, scores
 from boom_twin.health.fault_twins import FaultTwins
 from boom_twin.health.faults import Fault, hypothesis, possible_faults
 from boom_twin.texts import alarm_text
@@ -111,6 +111,22 @@ def test_evidence_is_the_ratio_of_likelihoods_of_gaussian_readings():
 
     assert (found.place, found.onset) == (0, 4 * SECOND) and found.sizes[0] == pytest.approx(0.3, abs=0.1)
     assert found.evidence == pytest.approx(math.log(np.mean([factor(onset) for onset in range(8)])), abs=0.02)
+
+
+def test_seconds_must_agree_on_a_size():
+    """A softer spring is 3 nats a second likelier at its own size, and less likely at half of it: vibration out of phase.
+
+    The same gain of 20 s in a single second, such as by a valve that a twin opens, counts as one.
+    """
+
+    def course(gains):
+        return lambda size: -2.0 * min(size / 0.15, 1.0) + gains * np.exp(-(((size - 0.36) / 0.08) ** 2))
+
+    even, jump = np.full(20, 5.0), np.where(np.arange(20) == 9, 160.0, 0.0)
+    found = [likeliest(0.25, 0.06, math.log(19.0), course(gains)) for gains in (even, jump)]
+    assert all(each.size == pytest.approx(0.35, abs=0.02) and each.probability > 10.0 for each in found)
+    assert found[0].agreement == pytest.approx(math.sqrt(20)) and found[1].agreement < 0.0
+    assert course(even)(0.18).sum() < course(even)(0.0).sum()
 
 
 def innovations_of(values, count=None):

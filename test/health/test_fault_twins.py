@@ -1,7 +1,9 @@
 """Causes named by fault twins in bundled sessions, read with their own scene and with scenes of a stiffer boom."""
 
 import json
+import math
 import threading
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +13,7 @@ from command import main
 from default_boom import anew, parameter, with_parameters
 from health.recorded import session
 
-from boom_twin import Settings, Twin, load_scene
+from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
 from boom_twin.health.causes import MEMORY
 from boom_twin.health.fault_twins import FaultTwins
 from boom_twin.twin.blocks import block_of
@@ -43,6 +45,23 @@ def test_a_boom_as_its_scene_has_no_cause(tmp_path, bag):
     before = threading.active_count()
     assert alarms_of(tmp_path, load_scene(), "--causes", bag=bag) == []
     assert threading.active_count() <= before
+
+
+def test_a_boom_at_rest_under_less_load_than_expected_has_no_cause():
+    """White noise of the sensors alone, and a filter that expects four times the usual load: no payload explains that."""
+    scene, rng, sigmas = load_scene(), np.random.default_rng(1), Settings()
+    rest = statics(scene, posture="arch")
+    angle = Twin(scene).update(Sample(Stream.STROKES, 0, tuple(rest.lengths))).prediction.tip_angle
+    readings = {
+        Stream.STROKES: (rest.lengths, sigmas.stroke_sigma),
+        Stream.ANGLES: (rest.joints, sigmas.angle_sigma),
+        Stream.IMU: (9.81 * np.array([math.sin(angle), math.cos(angle)]), sigmas.imu_sigma),
+    }
+    with closing(Twin(scene, Settings(expected_load=0.01), health=True, causes=True)) as twin:
+        for stamp in range(SECOND, 21 * SECOND, SECOND // 50):
+            for stream, (values, sigma) in readings.items():
+                report = twin.update(Sample(stream, stamp, tuple(values + sigma * rng.standard_normal(len(values)))))
+                assert report.health is None or report.health.alarms == ()
 
 
 @pytest.mark.parametrize(
