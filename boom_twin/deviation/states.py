@@ -24,13 +24,16 @@ DELAYED = 128  # states at most that hold readings of late streams, see `delayed
 
 
 class SensorNoise(NamedTuple):
-    """Variance of what drives the model, error of the scene, sizes of loads: usual, least, first in a session, just come.
+    """Variances of what drives the model, error of the scene, sizes of loads: usual, least, first in a session, just come.
 
-    length2 : of lengths (m^2) or angles (rad^2). scene_error : relative standard deviation of stiffnesses and masses. The
+    length2, zero2, rounding2 : of lengths (m^2) or angles (rad^2): of a reading, of its zero, of the rounding that stays while
+    the boom is at rest. scene_error : relative standard deviation of stiffnesses and masses. The
     loads are in N.
     """
 
     length2: float
+    zero2: float
+    rounding2: float
     scene_error: float
     usual_load: float
     least_load: float
