@@ -247,8 +247,12 @@ class BoomPredictor:
         f.settled[:] = angles | strokes
         f.apart[f.settled] = 0.0
 
-    def allow_for(self, faults: Sequence[FaultyBoom]) -> None:
-        """State the deviation of the tip by these faults, which neither prediction nor estimate contain."""
+    def allow_for(self, faults: Sequence[FaultyBoom], lag: float) -> None:
+        """State the deviation of the tip by these faults, which neither prediction nor estimate contain.
+
+        `lag` (s) is that of the stamps of what drives the model.
+        """
+        self.filters.lateness[0] = lag
         self._faults.write_covariance(faults, self.filters.fault)
 
     def add_phase(self) -> None:

@@ -90,6 +90,7 @@ class Filters(NamedTuple):
     variances: Array  # (s,) of its noise
     felt: Array  # (c,) specific force that channels of accelerometers read by `motion`, m/s^2
     fault: Array  # (6,) variances of the tip by named faults, see `named_faults`
+    lateness: Array  # (1,) named lag of what drives the model, s
     pulls: Array  # (n,) predicted forces, N
     evidence: Array  # (1,) logarithm of the likelihood of all that was read, up to a constant
     driving: Array  # (n, s) rows of the lengths
@@ -141,7 +142,8 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         modal=np.zeros((modes, 6)), transition=vectors(own, whole(own)), turned=vectors(own, whole(own)),
         kept=np.zeros((states, states)), kept_mean=np.zeros(states),
-        variances=np.zeros(states), felt=np.zeros(channels), fault=np.zeros(6), pulls=np.zeros(n), evidence=np.zeros(1),
+        variances=np.zeros(states), felt=np.zeros(channels), fault=np.zeros(6), lateness=np.zeros(1),
+        pulls=np.zeros(n), evidence=np.zeros(1),
         row=vectors(states), gain=vectors(states), gains=vectors(4, 4, states), driving=vectors(n, states), offsets=np.zeros(n),
         rows=vectors(9, states), likely=np.zeros(6),
         switch=np.zeros((3, 3)), shares=np.zeros((3, 3)), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),

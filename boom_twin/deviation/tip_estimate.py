@@ -58,6 +58,7 @@ def write_tip_estimate(p, f, live, results, out):
     add_doubt(p, f, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     add_scene_doubt(p, f, live, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     write_covariance(f, ESTIMATE, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
+    add_square(out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE], f.lateness[0] * f.lateness[0], f.motion[0, 6:9])
     write_covariance(f, ESTIMATE, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
     for j in range(MODES):
         out[COORDINATES + j] = f.mean[ESTIMATE, j] if j < m else math.nan
@@ -173,8 +174,14 @@ def write_predicted_covariance(p, f, live, out):
 
 @inner
 def add_scene_error(p, f, live, out):
-    """Add the covariance of the tip by errors of the scene, and by named faults that it does not have."""
+    """Add the covariance of the tip by errors of the scene, and by named faults that it does not have.
+
+    If stamps of what drives the model lag by T, the tip is where it was T ago: v T and a T^2 / 2 away.
+    """
     add_section_errors(p, f, live, 0, out)
+    late2 = f.lateness[0] * f.lateness[0]
+    add_square(out, late2, f.motion[0, 3:6])
+    add_square(out, 0.25 * late2 * late2, f.motion[0, 6:9])
     for i in range(6):
         out[i] += f.fault[i]
 
