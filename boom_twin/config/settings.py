@@ -238,6 +238,8 @@ class Settings(_Table):
         """
         sigma, h = self.noise(kind)
         turns = 2.0 * math.pi * sigma / h if h > 0.0 else math.inf
+        if turns > 6.0:  # exp(-36) is within the rounding of numbers
+            return 0.0
         return h * h / (2.0 * math.pi**2) * sum(math.exp(-((k * turns) ** 2)) / k**2 for k in range(1, 100))
 
     def rate(self, reads: StrokeReading) -> float:

@@ -119,11 +119,11 @@ def standing_share(p, i, row):
 @inner
 def standing_variance(p, f, row):
     """Return the variance of a predicted reading by the zeros and the lasting rounding of what drives the model."""
-    total = 0.0
-    for i in range(p.drives.shape[0]):
+    variance, total = f.noise.zero2 + f.noise.rounding2, 0.0
+    for i in range(p.drives.shape[0] if variance > 0.0 else 0):
         share = standing_share(p, i, row)
         total += share * share
-    return total * (f.noise.zero2 + f.noise.rounding2)
+    return total * variance
 
 
 @inner

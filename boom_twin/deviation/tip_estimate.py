@@ -96,7 +96,7 @@ def add_doubt(p, f, out):
 @inner
 def add_standing_errors(p, f, variance, out):
     """Add the covariance of the tip by lasting errors of what drives the model; `f.rows` are those of the tip."""
-    for i in range(p.drives.shape[0]):
+    for i in range(p.drives.shape[0] if variance > 0.0 else 0):
         for a in range(3):
             f.gain[a] = standing_share(p, i, f.rows[a])
         add_square(out, variance, f.gain)
