@@ -84,7 +84,8 @@ class Measurement(NamedTuple):
     channels, sites : recarray
         Rows of `CHANNEL` and of `SITE`; the tip is the first site.
     errors : recarray
-        Rows of `ERROR`: states behind the zeros, mount and scale of the tip IMU, and the zeros of angles and forces.
+        Rows of `ERROR`: states behind the zeros, mount and scale of the tip IMU, and the zeros of angles and forces. Uncertain
+        zeros of strokes are the first.
     psi : ndarray, shape (sites, shapes)
         Rotation of a beam at the site by its bending coordinates.
     weights : ndarray, shape (sites, points)

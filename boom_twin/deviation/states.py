@@ -176,7 +176,8 @@ def drive_place(p):
 def zero_place(p):
     """Return how many states the prediction has.
 
-    Zeros (2), mount, scale of the tip IMU, zeros of angles and forces follow, then the errors of further sensors.
+    Zeros (2), mount, scale of the tip IMU, zeros of angles and forces follow, then uncertain zeros of strokes, and
+    the errors of further sensors.
     """
     return 2 * p.modes[0] + LOADS + 3 * p.drives.shape[0]
 
