@@ -69,13 +69,13 @@ class TipLoad:
 
     @property
     def bound(self) -> float:
-        """Root mean square below which the load cannot be told from none, N."""
-        return max(LEAST, 2.0 * self.sigma)
+        """Upper bound of the load, N: its estimate and two standard deviations of that."""
+        return max(LEAST, self.rms + 2.0 * self.sigma)
 
     @property
     def is_there(self) -> bool:
-        """Return True if the load is `bound` or more, or has pulses."""
-        return self.rms >= self.bound or self.pulses is not None
+        """Return True if the load can be told from none, or has pulses."""
+        return self.rms >= max(LEAST, 2.0 * self.sigma) or self.pulses is not None
 
     @property
     def text(self) -> str:
@@ -84,7 +84,7 @@ class TipLoad:
             digits = min(max(1, int(np.ceil(-np.log10(self.pulses.frequency_sigma)))), 4)
             sure = f"{self.pulses.frequency:.{digits}f} Hz (+- {self.pulses.frequency_sigma:.{digits}f})"
             return f"pulses of {self.pulses.height:.0f} N (+- {self.pulses.height_sigma:.0f}) at {sure}"
-        if self.rms >= self.bound:
+        if self.is_there:
             return f"{self.rms:.0f} N rms (+- {self.sigma:.0f}), no main frequency"
         return f"none above {self.bound:.0f} N"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
@@ -165,6 +166,7 @@ class Settings(_Table):
 
     stroke_sigma: float = setting(2.0e-5, "m", NOT_NEGATIVE, "standard deviation of the noise of a stroke transducer")
     stroke_resolution: float = setting(5.0e-6, "m", POSITIVE, "resolution of a stroke transducer")
+    stroke_zero: float = setting(0.0, "m", NOT_NEGATIVE, "standard deviation of the zero of a stroke transducer")
     angle_sigma: float = setting(1.745e-4, "rad", NOT_NEGATIVE, "standard deviation of the noise of a joint encoder")
     angle_resolution: float = setting(8.727e-5, "rad", POSITIVE, "resolution of a joint encoder")
     imu_sigma: float = setting(0.05, "m/s^2", POSITIVE, "standard deviation of the noise of an accelerometer")
@@ -229,6 +231,19 @@ class Settings(_Table):
         """Return the variance (noise and rounding) of one reading of a stream's sensors, in the square of their SI unit."""
         sigma, resolution = self.noise(kind)
         return sigma**2 + resolution**2 / 12.0
+
+    def standing(self, kind: SensorKind) -> float:
+        """Return the variance of the rounding of a stream's sensors that no mean over readings at rest reduces, in SI units.
+
+        Normal noise of s before the rounding to steps of h dithers it. At rest anywhere in a step the mean error of rounding
+        has the variance h^2 / (2 pi^2) sum_k exp(-(2 pi k s / h)^2) / k^2, which is h^2 / 12 without noise (B. Widrow and
+        I. Kollar, Quantization Noise, Cambridge 2008).
+        """
+        sigma, h = self.noise(kind)
+        turns = 2.0 * math.pi * sigma / h if h > 0.0 else math.inf
+        if turns > 6.0:  # exp(-36) is within the rounding of numbers
+            return 0.0
+        return h * h / (2.0 * math.pi**2) * sum(math.exp(-((k * turns) ** 2)) / k**2 for k in range(1, 100))
 
     def rate(self, reads: StrokeReading) -> float:
         """Return the maximum rate of what drives the model, m/s or rad/s."""

@@ -28,6 +28,7 @@ from .rows import (
     force_row,
     rate_row,
     site_column,
+    standing_variance,
     variance_of,
 )
 from .sensor_model import Mounting, section_frames
@@ -83,13 +84,16 @@ class Measurement(NamedTuple):
     channels, sites : recarray
         Rows of `CHANNEL` and of `SITE`; the tip is the first site.
     errors : recarray
-        Rows of `ERROR`: states behind the zeros, mount and scale of the tip IMU, and the zeros of angles and forces.
+        Rows of `ERROR`: states behind the zeros, mount and scale of the tip IMU, and the zeros of angles and forces. Uncertain
+        zeros of strokes are the first.
     psi : ndarray, shape (sites, shapes)
         Rotation of a beam at the site by its bending coordinates.
     weights : ndarray, shape (sites, points)
         See `boom_twin.kernels.elements.beam_shapes.integrals_to`, m.
     bending : ndarray, shape (stations, unknowns)
         Bending moments that strain gauges read by the unknowns, N m.
+    stroke_zero : int
+        Place of the first zero of a stroke among the states behind those of the prediction; 0 if strokes have none.
     """
 
     channels: np.recarray
@@ -98,6 +102,7 @@ class Measurement(NamedTuple):
     psi: Array
     weights: Array
     bending: Array
+    stroke_zero: int
 
 
 @kernel
@@ -180,7 +185,8 @@ def write_expected_readings(p, f, live, results, stamp, h, values, sigmas):
             values[c] = f.motion[channel.site, 5]
         else:
             values[c] = f.felt[c]
-        sigmas[c] = math.sqrt(noise2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
+        variance = variance_of(f.row, f.spread[PREDICTION], f.gain, size) + standing_variance(p, f, f.row)
+        sigmas[c] = math.sqrt(noise2 + variance)
         note_curve(f.curves[c], values[c], h)
         if copies >= 0 and f.copies[c] >= 0:
             f.row[size + channel.zero] = 1.0
@@ -203,10 +209,11 @@ def measurement_of(
     mounting: Mounting,
     places: Mapping[str, Place],
     lagging: Collection[Stream] = (),
+    has_strokes: bool = True,
 ) -> Measurement:
     """Return the measured channels of a boom whose angle sensors have this mounting and others these places, by their names.
 
-    The lag and the drift of `lagging` streams are states.
+    The lag and the drift of `lagging` streams are states, and zeros of strokes that drive the model and are uncertain.
 
     Raises
     ------
@@ -216,6 +223,8 @@ def measurement_of(
     sites, rows, errors = _Sites(plan), list[tuple[float, ...]](), list[tuple[float, float, bool]]()
     bending = list[Array]()
     n, codes = plan.joints, {stream: code for code, stream in enumerate(Stream)}
+    stroke_zero = TIP_IMU_STATES + 2 * n if has_strokes and settings.stroke_zero > 0.0 else 0
+    errors += [(settings.stroke_zero, 0.0, False)] * n * (stroke_zero > 0)
 
     def add(stream: Stream, reads: int, index: int, site: int = 0, turned: float = 0.0, zero: int = 0, behind: int = 0) -> None:
         """Add a channel whose reading depends on its zero, and on as many states up to `behind` places further."""
@@ -261,7 +270,7 @@ def measurement_of(
     rows = [(*row, lag_of[int(row[0])]) for row in rows]
     stations = np.array(bending).reshape(-1, len(plan.names))
     tables = _table(rows, CHANNEL), _table([row for row, _ in sites.found], SITE), _table(errors, ERROR)
-    return Measurement(*tables, *sites.shapes(), stations)
+    return Measurement(*tables, *sites.shapes(), stations, stroke_zero)
 
 
 def _table(rows: Sequence[tuple[float, ...]], kind: np.dtype) -> np.recarray:

@@ -85,12 +85,13 @@ class Posture(NamedTuple):
     points: NDArray[np.int64]  # (k, 2) mass points: place of x in h (y follows), section
     lengths: Array  # (n,) of the sections, m
     closed: Array  # (n,) closed lengths of the cylinders, m
-    channels: np.recarray  # as the next five, see `boom_twin.deviation.channels.Measurement`
+    channels: np.recarray  # as the next six, see `boom_twin.deviation.channels.Measurement`
     sites: np.recarray
     errors: np.recarray
     psi: Array
     weights: Array
     bending: Array
+    stroke_zero: int
     behind: NDArray[np.int64]  # (1,) states of sensors' errors that the estimate has beside those of the prediction
     delayed: NDArray[np.int64]  # (1,) copies of late readings behind these, see `boom_twin.deviation.delayed`
     # scratch; `rate` (n,) stays zero
@@ -127,7 +128,7 @@ def new_posture(
         curvature=np.zeros(n), frames=mounting.frames.astype(np.int64), absolute=mounting.absolute, sways=mounting.sways,
         roots=np.append(roots, heads[-1]).astype(np.int64), masses=plan.masses, points=np.array(list(_mass_points(plan))),
         lengths=lengths, closed=plan.closed_lengths, **measured._asdict(),
-        behind=np.array([TIP_IMU_STATES + 2 * n]), delayed=np.zeros(1, np.int64),
+        behind=np.array([TIP_IMU_STATES + (3 if measured.stroke_zero else 2) * n]), delayed=np.zeros(1, np.int64),
         still=np.zeros(histories), position=np.zeros(histories), hat=np.zeros(histories),
         response=np.zeros((most, unknowns)), sides=np.zeros((2, width)),
         shifted=np.zeros((most, histories)), small=np.zeros((4, most, most)), target=np.zeros(n), rate=np.zeros(n),

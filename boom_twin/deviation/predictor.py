@@ -129,10 +129,11 @@ class BoomPredictor:
         lengths, self._reads = np.array([each.length for each in scene.sections]), reads
         self.channels = channels_of(n, streams_of(places))
         mounting = mounting_of(self.plan, mounts)
-        measured = measurement_of(self.plan, settings, mounting, places, lagging)
+        measured = measurement_of(self.plan, settings, mounting, places, lagging, reads is not StrokeReading.ANGLE)
         self.posture = new_posture(self.plan, MODES, lengths, mounting, measured, reads, scene.base.inclination)
         loads = [size * weight for size in (settings.expected_load, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)]
-        noise = SensorNoise(settings.variance(SENSORS[reads.stream]), settings.scene_error, *loads)
+        kind, zero2 = SENSORS[reads.stream], 0.0 if reads is StrokeReading.ANGLE else settings.stroke_zero**2
+        noise = SensorNoise(settings.variance(kind), zero2, settings.standing(kind), settings.scene_error, *loads)
         self.filters = new_filters(n, MODES, measured, noise)
         self.finder = RestFinder(scene, self.plan, self.posture, reads)
         self.sensors = SensorErrors(self.posture, self.filters, self.channels)
@@ -246,8 +247,12 @@ class BoomPredictor:
         f.settled[:] = angles | strokes
         f.apart[f.settled] = 0.0
 
-    def allow_for(self, faults: Sequence[FaultyBoom]) -> None:
-        """State the deviation of the tip by these faults, which neither prediction nor estimate contain."""
+    def allow_for(self, faults: Sequence[FaultyBoom], lag: float) -> None:
+        """State the deviation of the tip by these faults, which neither prediction nor estimate contain.
+
+        `lag` (s) is that of the stamps of what drives the model.
+        """
+        self.filters.lateness[0] = lag
         self._faults.write_covariance(faults, self.filters.fault)
 
     def add_phase(self) -> None:

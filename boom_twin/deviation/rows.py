@@ -84,7 +84,10 @@ def spread_of(row, covariance, gain, size):
 
 @kernel
 def column_row(p, columns, at, scale, row):
-    """Write the row of a quantity that changes by `scale` times a column of `columns` (c, ..) a state, see `Posture`."""
+    """Write the row of a quantity that changes by `scale` times a column of `columns` (c, ..) a state, see `Posture`.
+
+    A drive is known up to the zero of its stroke, which moves the boom by as much the other way.
+    """
     n, m = p.drives.shape[0], p.modes[0]
     clear(row, all_states(p))
     load, drive = force_place(p), drive_place(p)
@@ -94,6 +97,33 @@ def column_row(p, columns, at, scale, row):
         row[load + a] = row[load + 2 + a] = scale * columns[a, at]
     for i in range(n):
         row[drive + i] = scale * columns[2 + i, at]
+        if p.stroke_zero > 0:
+            row[zero_place(p) + p.stroke_zero + i] = -row[drive + i]
+
+
+@inner
+def standing_share(p, i, row):
+    """Return how far the reading of `row` is off by a unit of a lasting error of sensor `i` of those that drive the model.
+
+    An inclinometer that is off turns its section alone: the next inclinometer makes up for it.
+    """
+    at = drive_place(p) + i
+    if not p.reads_angle:
+        return row[at]
+    share = row[at] / p.slope[i]
+    if i + 1 < p.drives.shape[0] and p.absolute[i + 1]:
+        share -= row[at + 1] / p.slope[i + 1]
+    return share
+
+
+@inner
+def standing_variance(p, f, row):
+    """Return the variance of a predicted reading by the zeros and the lasting rounding of what drives the model."""
+    variance, total = f.noise.zero2 + f.noise.rounding2, 0.0
+    for i in range(p.drives.shape[0] if variance > 0.0 else 0):
+        share = standing_share(p, i, row)
+        total += share * share
+    return total * variance
 
 
 @inner

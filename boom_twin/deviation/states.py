@@ -24,13 +24,16 @@ DELAYED = 128  # states at most that hold readings of late streams, see `delayed
 
 
 class SensorNoise(NamedTuple):
-    """Variance of what drives the model, error of the scene, sizes of loads: usual, least, first in a session, just come.
+    """Variances of what drives the model, error of the scene, sizes of loads: usual, least, first in a session, just come.
 
-    length2 : of lengths (m^2) or angles (rad^2). scene_error : relative standard deviation of stiffnesses and masses. The
+    length2, zero2, rounding2 : of lengths (m^2) or angles (rad^2): of a reading, of its zero, of the rounding that stays while
+    the boom is at rest. scene_error : relative standard deviation of stiffnesses and masses. The
     loads are in N.
     """
 
     length2: float
+    zero2: float
+    rounding2: float
     scene_error: float
     usual_load: float
     least_load: float
@@ -87,6 +90,7 @@ class Filters(NamedTuple):
     variances: Array  # (s,) of its noise
     felt: Array  # (c,) specific force that channels of accelerometers read by `motion`, m/s^2
     fault: Array  # (6,) variances of the tip by named faults, see `named_faults`
+    lateness: Array  # (1,) named lag of what drives the model, s
     pulls: Array  # (n,) predicted forces, N
     evidence: Array  # (1,) logarithm of the likelihood of all that was read, up to a constant
     driving: Array  # (n, s) rows of the lengths
@@ -138,7 +142,8 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
         copies=np.full(channels, -1), instants=np.zeros(DELAYED, np.int64),
         modal=np.zeros((modes, 6)), transition=vectors(own, whole(own)), turned=vectors(own, whole(own)),
         kept=np.zeros((states, states)), kept_mean=np.zeros(states),
-        variances=np.zeros(states), felt=np.zeros(channels), fault=np.zeros(6), pulls=np.zeros(n), evidence=np.zeros(1),
+        variances=np.zeros(states), felt=np.zeros(channels), fault=np.zeros(6), lateness=np.zeros(1),
+        pulls=np.zeros(n), evidence=np.zeros(1),
         row=vectors(states), gain=vectors(states), gains=vectors(4, 4, states), driving=vectors(n, states), offsets=np.zeros(n),
         rows=vectors(9, states), likely=np.zeros(6),
         switch=np.zeros((3, 3)), shares=np.zeros((3, 3)), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)),
@@ -171,7 +176,8 @@ def drive_place(p):
 def zero_place(p):
     """Return how many states the prediction has.
 
-    Zeros (2), mount, scale of the tip IMU, zeros of angles and forces follow, then the errors of further sensors.
+    Zeros (2), mount, scale of the tip IMU, zeros of angles and forces follow, then uncertain zeros of strokes, and
+    the errors of further sensors.
     """
     return 2 * p.modes[0] + LOADS + 3 * p.drives.shape[0]
 

@@ -22,8 +22,19 @@ from .estimate_row import (
 )
 from .kalman import ANGLE_ZERO
 from .mixture import renew_estimate
-from .rows import acceleration_row, clear, column_row, difference, rate_row, read, spread_of, variance_of
-from .states import ESTIMATE, PREDICTION, force_place, zero_place
+from .rows import (
+    acceleration_row,
+    clear,
+    column_row,
+    difference,
+    rate_row,
+    read,
+    spread_of,
+    standing_share,
+    standing_variance,
+    variance_of,
+)
+from .states import ESTIMATE, PREDICTION, copy_place, force_place, zero_place
 
 MASS_PART = 0.77  # variance of the tip by errors of the masses over that of EI: a cantilever of four equal sections
 FAULT_CHANCE, FAULT = 0.01, 0.03  # that a sensor is off, and by how much as an angle of its joint, rad
@@ -32,20 +43,22 @@ FAULT_CHANCE, FAULT = 0.01, 0.03  # that a sensor is off, and by how much as an 
 @inner
 def write_tip_estimate(p, f, live, results, out):
     """Write the estimate beside the newest prediction; see `boom_twin.deviation.estimate_row.WIDTH`."""
-    n, m, size, load = p.drives.shape[0], p.modes[0], zero_place(p), force_place(p)
+    n, m, size, every, load = p.drives.shape[0], p.modes[0], zero_place(p), copy_place(p), force_place(p)
     mean, expected = f.mean[ESTIMATE], f.mean[PREDICTION]
     renew_estimate(p, f)
     for a in range(3):
         column_row(p, p.readings, n + a, 1.0, f.rows[a])
         rate_row(p, n + a, f.rows[3 + a])
         acceleration_row(p, n + a, f.rows[6 + a])
-        out[TIP + a] = results.tip[0, a] + difference(f.rows[a], mean, expected, size)
+        out[TIP + a] = results.tip[0, a] + difference(f.rows[a], mean, expected, every)
         out[VELOCITY + a] = results.tip[1, a] + difference(f.rows[3 + a], mean, expected, size)
         out[ACCELERATION + a] = results.tip[2, a] + difference(f.rows[6 + a], mean, expected, size)
-    write_covariance(f, ESTIMATE, 0, size, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
+    write_covariance(f, ESTIMATE, 0, every, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
+    add_standing_errors(p, f, f.noise.rounding2, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     add_doubt(p, f, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     add_scene_doubt(p, f, live, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
     write_covariance(f, ESTIMATE, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
+    add_square(out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE], f.lateness[0] * f.lateness[0], f.motion[0, 6:9])
     write_covariance(f, ESTIMATE, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
     for j in range(MODES):
         out[COORDINATES + j] = f.mean[ESTIMATE, j] if j < m else math.nan
@@ -72,11 +85,21 @@ def add_doubt(p, f, out):
             continue
         column_row(p, p.readings, i, 1.0, f.row)
         usual2 = ANGLE_ZERO * ANGLE_ZERO + variance_of(f.row, f.spread[PREDICTION], f.gain, zero_place(p))
+        usual2 += standing_variance(p, f, f.row)
         log_odds = (
             0.5 * (apart / FAULT) ** 2 - 0.5 * apart * apart / usual2 + math.log(FAULT / (FAULT_CHANCE * math.sqrt(usual2)))
         )
         share = (apart / p.slope[i]) ** 2 / (math.exp(min(log_odds, 500.0)) + 2.0)
         add_square(out, share, p.readings[2 + i, n : n + 3])
+
+
+@inner
+def add_standing_errors(p, f, variance, out):
+    """Add the covariance of the tip by lasting errors of what drives the model; `f.rows` are those of the tip."""
+    for i in range(p.drives.shape[0] if variance > 0.0 else 0):
+        for a in range(3):
+            f.gain[a] = standing_share(p, i, f.rows[a])
+        add_square(out, variance, f.gain)
 
 
 @inner
@@ -145,13 +168,20 @@ def write_predicted_covariance(p, f, live, out):
     for a in range(3):
         column_row(p, p.readings, p.drives.shape[0] + a, 1.0, f.rows[a])
     write_covariance(f, PREDICTION, 0, zero_place(p), out)
+    add_standing_errors(p, f, f.noise.zero2 + f.noise.rounding2, out)
     add_scene_error(p, f, live, out)
 
 
 @inner
 def add_scene_error(p, f, live, out):
-    """Add the covariance of the tip by errors of the scene, and by named faults that it does not have."""
+    """Add the covariance of the tip by errors of the scene, and by named faults that it does not have.
+
+    If stamps of what drives the model lag by T, the tip is where it was T ago: v T and a T^2 / 2 away.
+    """
     add_section_errors(p, f, live, 0, out)
+    late2 = f.lateness[0] * f.lateness[0]
+    add_square(out, late2, f.motion[0, 3:6])
+    add_square(out, 0.25 * late2 * late2, f.motion[0, 6:9])
     for i in range(6):
         out[i] += f.fault[i]
 

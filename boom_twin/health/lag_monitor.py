@@ -30,6 +30,7 @@ class LagMonitor:
 
     def __init__(self, drive: Stream) -> None:
         self._drive, self._alarms = drive, dict[Stream, Alarm]()
+        self._newest = 0.0  # s, of the drive, while it is late
         self.begin()
 
     def begin(self) -> None:
@@ -41,6 +42,11 @@ class LagMonitor:
     def alarms(self) -> tuple[Alarm, ...]:
         """Alarms that last."""
         return tuple(self._alarms.values())
+
+    @property
+    def lag_of_drive(self) -> float:
+        """Lag of the stream that drives the model, s; 0 while it has no alarm."""
+        return self._newest if self._drive in self._alarms else 0.0
 
     def is_late(self, stream: Stream) -> bool:
         """Return True if the stream and the strokes are known to be of different times."""
@@ -65,6 +71,7 @@ class LagMonitor:
             surest = min(late.values(), key=lambda lag: lag.sigma)
             if not any(_exceeds(lag._replace(lag=lag.lag - surest.lag)) for lag in lags.values()):
                 late = {self._drive: surest._replace(lag=-surest.lag)}
+        self._newest = late[self._drive].lag if self._drive in late else self._newest
         near = {stream for stream, lag in lags.items() if abs(lag.lag) + SIGMAS * lag.sigma < LEAST}
         if near == lags.keys():
             near.add(self._drive)

@@ -161,6 +161,12 @@ class HealthMonitor:
         return [] if self.fault_twins is None else self.fault_twins.alarms
 
     @property
+    def drive_lag(self) -> float:
+        """Named lag of what drives the model, s; 0 without one."""
+        named = (rank for each in self._named if each.cause == f"{self._drive.value}.delay" for rank in each.ranked[:1])
+        return self._lags.lag_of_drive or next((size for rank in named for _, size, _, _ in rank.parts), 0.0)
+
+    @property
     def faulty_booms(self) -> Sequence[FaultyBoom]:
         """Boom with each named fault of stiffnesses and loads; the same object until other faults are named."""
         if (named := self._named) != self._told_faults:

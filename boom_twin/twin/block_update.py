@@ -162,7 +162,7 @@ class BlockUpdate:
         self._tell_health(run.newest // SLOT * SLOT)
         health = self._judge.judge(run.newest, self._boom.tip_loads, lambda: self._boom.tip_sigmas)
         self._boom.leave_out(self._judge.suspected, self._judge.failing_strokes, self._judge.wrong_angles)
-        self._boom.allow_for(self._judge.faulty_booms)
+        self._boom.allow_for(self._judge.faulty_booms, self._judge.drive_lag)
         return health
 
     def _take_judgement(self, row: int) -> None:

@@ -15,9 +15,10 @@ from boom_twin.health.blocks import Block, MeasuredRows
 from boom_twin.health.lag_monitor import LagMonitor
 from boom_twin.health.monitor import HealthMonitor
 from boom_twin.health.sensor_check import SensorCheck, StreamReadings
+from boom_twin.offline.ground_truth import load_truth
 from boom_twin.types import NO_PLACES, Alarm, Array, StrokeReading, channels_of
 
-from .recorded import run, session
+from .recorded import ARCH, run, session
 
 RATE, BLOCK = 20, 0.1  # readings of a block, its length in s
 NONE = np.zeros(2, dtype=bool)  # masked channels
@@ -128,10 +129,10 @@ def test_a_lag_that_fault_twins_name_too_is_one_alarm() -> None:
     assert list(monitor._lasting()) == [alarm]
 
 
-def late(seconds: float, lag: float) -> tuple[Sample, ...]:
-    """Return the bundled session with the angles' stamps so late (s)."""
+def late(seconds: float, lag: float, late_stream: Stream = Stream.ANGLES) -> tuple[Sample, ...]:
+    """Return the bundled session with the stamps of a stream so late (s)."""
     moved = [
-        Sample(each.stream, each.stamp + round(lag * 1e9), each.values) if each.stream is Stream.ANGLES else each
+        Sample(each.stream, each.stamp + round(lag * 1e9), each.values) if each.stream is late_stream else each
         for each in session(seconds)
     ]
     return tuple(sorted(moved, key=lambda each: each.stamp))
@@ -142,3 +143,22 @@ def test_late_angles_are_told_as_that_alone_and_not_used() -> None:
     """What they show is of another time, in moves tens of millimetres off: no encoder is off its prediction by that."""
     found = run(late(40.0, 0.3))
     assert {(channel, kind) for _, channel, kind, _ in found.told()} == {("joint_angles", "late")}
+
+
+def test_a_named_lag_of_strokes_is_in_the_stated_deviations() -> None:
+    """The tip of late strokes is where the boom was: 60 ms ago it was up to 80 mm away."""
+    samples, truth = late(25.0, 0.06, Stream.STROKES), load_truth(ARCH)
+    found = run(samples)
+    (named,) = {(time, channel) for time, channel, kind, _ in found.told() if kind == "late"}
+    estimates = [each.estimate for each in found.reports if each.estimate is not None]
+    first = min(each.stamp for each in session(25.0) if each.stream is Stream.STROKES)
+    assert truth is not None and named[1] == "cylinder_strokes" and named[0] < 15.0
+    times = np.array([(each.stamp - first) * 1e-9 + truth.times[0] for each in estimates])
+    after = times - times[0] > named[0] + 0.5
+    true = [truth.at(times, each)[after] for each in (truth.position, np.gradient(truth.position, truth.times, axis=0))]
+    for true_value, value, variance, most in (
+        (true[0], [each.tip[:2] for each in estimates], [each.tip_covariance[[0, 3]] for each in estimates], 0.02),
+        (true[1], [each.velocity[:2] for each in estimates], [each.velocity_covariance[[0, 3]] for each in estimates], 0.02),
+    ):
+        error = np.array(value)[after] - true_value
+        assert np.abs(error).max() > most and np.sqrt(np.mean(error**2 / np.array(variance)[after])) < 1.5
