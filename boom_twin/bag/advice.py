@@ -34,7 +34,8 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
     with suppress(BagError):  # the loop below tells it
         found.extend(conflicts(info.session, topics, joints, scene))
     for stream, topic in topics.inputs.items():
-        if not SENSORS[stream].lack and info.session.find(topic.name) is None:
+        known = info.session.find(topic.name)
+        if not SENSORS[stream].lack and (known is None or known.count == 0):
             continue
         try:
             name = check_topic(info.session, topic.name, topic.type).name

@@ -31,8 +31,6 @@ def refuse_overwriting(out: Path, sources: Sequence[Path], force: bool) -> None:
         check_target(path, sources)
         if path.exists() and not force:
             raise UsageError(f"{path}: is there already. Name another file, or add --force to replace it.")
-    if not out.parent.is_dir():
-        raise UsageError(f"{out}: there is no folder {out.parent}. Make it first.")
 
 
 def provenance(found: Calibration, credit: str) -> str:
@@ -51,6 +49,7 @@ def write_scene(found: Calibration, scene: Scene, text: str, out: Path, credit: 
     note = provenance(found, credit)
     description = f"{scene.description.rstrip()}\n{note}" if scene.description else note
     wanted = found.scene.model_copy(update={"description": description})
+    out.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(out, with_end_mark(rewritten(text, scene, wanted)))
 
 

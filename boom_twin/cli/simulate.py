@@ -92,8 +92,8 @@ def as_text(result: Simulation, out: str) -> list[str]:
     (x, y), (end_x, end_y) = result.tip[0, :2], result.tip[-1, :2]
     lines = [
         f"started at rest   strokes {numbers(result.strokes[0])} m, tip x {x:.4f} m, y {y:.4f} m",
-        f"followed          {figures['rows']} rows, {figures['duration_s']:g} s; the tip went {figures['tip_travel_m']:.3f} m "
-        f"to x {end_x:.4f} m, y {end_y:.4f} m",
+        f"followed          {figures['rows']} rows, {figures['duration_s']:g} s; the way of the tip is "
+        f"{figures['tip_travel_m']:.3f} m long and ends at x {end_x:.4f} m, y {end_y:.4f} m",
         f"tip acceleration  {figures['tip_acceleration_max_m_s2']:.3g} m/s^2 at most",
         f"cylinder forces   {numbers(figures['cylinder_force_max_N'], 1e-3)} kN at most",
     ]
