@@ -1,6 +1,6 @@
-"""Parameters of a boom from recorded sessions: nonlinear least squares on the twin's model, with intervals.
+"""Parameters of a boom from recorded sessions, by maximum likelihood with the twin's filter, with intervals.
 
-See docs/calibrate.md for what it does and what sessions it needs.
+docs/calibrate.md explains the method and the sessions that it needs.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Innovations of all rest periods as a function of the unknowns, their maximum-likelihood estimate, and what cannot be told.
+"""Innovations of all rest periods as a function of the unknowns, the maximum-likelihood estimate, and undetermined unknowns.
 
 The innovations e of a Kalman filter with variances S have the log likelihood -sum (e^2 / S + log S) / 2. Scoring (Gauss-Newton
 with the Fisher information of both) finds its maximum with the priors. The covariance is H^-1 J H^-1 (H. White, Econometrica 50
-(1982), 1-25), J from sums of the score over blocks, so that it holds for innovations that are not white; and it allows for
-parameters that are taken to be known but may be wrong (consider covariance; B. Tapley et al., Statistical Orbit Determination,
-ch. 6).
+(1982), 1-25). J comes from sums of the score over blocks, so that it holds for innovations that are not white. The
+covariance includes errors of parameters that are not estimated (consider covariance; B. Tapley et al., Statistical Orbit
+Determination, ch. 6).
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class CalibrationProblem:
     def _boom_at(self, trial: dict[str, float]) -> Callable[[RestPeriod], RestFilter]:
         """Return a function that puts the boom of a trial to rest in a period, and returns its filter there.
 
-        The boom has the parameters of the trial, and its sensors read too much by the trial's zeros.
+        The boom has the parameters of the trial, and the trial's zeros are subtracted from the readings.
         """
         scene = with_parameters(self.scene, {name: value for name, value in trial.items() if not name.endswith(".zero")})
         zeros, rigging = np.array([trial.get(f"{name}.zero", 0.0) for name in self.names]), self._rigging
@@ -148,7 +148,7 @@ class CalibrationProblem:
         return np.array([(found - base) / DIFFERENCE for found in self.innovations(trials, noise)])
 
     def slopes_by_model(self, deviations: Array, assumed: Sequence[Unknown], noise: Noise, base: Array) -> Array:
-        """Return the same by parameters that are taken to be known, in the deviations that they may be wrong by."""
+        """Return derivatives by parameters that are not estimated, in units of their standard deviations, (q, r, 2)."""
         own = self.values(deviations)
         trials = (own | {each.name: each.value(DIFFERENCE)} for each in assumed)
         return np.array([(found - base) / DIFFERENCE for found in self.innovations(trials, noise)]).reshape(-1, *base.shape)
@@ -164,13 +164,13 @@ MOST = 12  # passes
 
 @dataclass(frozen=True)
 class Fit:
-    """Result of a fit; deviations of p unknowns are in units of the priors'."""
+    """Result of a fit; deviations of p unknowns are in standard deviations of their priors."""
 
     deviations: Array  # (p,), of the unknowns from their present values
     information: Array  # (p, p), Fisher's, without the priors
     scatter: Array  # (p, p), covariance of the score, from blocks of readings
-    pull: Array  # (p,), score and pull of the priors that are left; 0 but where a bound stops the fit
-    by_model: Array  # (p, q), change of the score by parameters taken to be known, by the deviation that they may be wrong by
+    pull: Array  # (p,), remaining gradient of the log posterior; 0 except where a bound stops the fit
+    by_model: Array  # (p, q), change of the score by parameters that are not estimated, per standard deviation of these
     misfits: Array  # (c,), rms of each channel's normalised innovations with the stated noise; 1: noise alone, or no readings
     passes: int
 
@@ -267,7 +267,7 @@ def _together(slopes: Array, others: Array, base: Array) -> Array:
 
 @dataclass(frozen=True)
 class InseparableUnknowns:
-    """Unknowns that the sessions cannot tell apart or determine; one alone: the sessions do not show it."""
+    """Unknowns that the sessions cannot separate; a single one cannot be determined."""
 
     names: tuple[str, ...]
 

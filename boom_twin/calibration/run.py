@@ -1,4 +1,4 @@
-"""Run a calibration: read sessions, hold out a part, fit, judge."""
+"""Calibration: read sessions, hold out a part, fit, compare residuals before and after."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class HeldOutResult:
-    """Residuals of c channels on what was held out."""
+    """Residuals of c channels on the held-out part."""
 
     names: tuple[str, ...]
     spread: Array  # (c,), root mean square of the normalised residuals; 1 if they are as expected, NaN for none
@@ -58,24 +58,24 @@ class Calibration:
     Attributes
     ----------
     scene : Scene
-        With the estimates that the sessions tell; all else as it was.
+        Scene with the determined estimates; all other values are unchanged.
     zeros : dict of str to float
-        What sensors read too much (SI) beyond the mapping, by channel; likewise.
+        Determined zeros (SI) of sensors by channel, in addition to those of the mapping.
     estimates : tuple of Estimate
     groups : tuple of InseparableUnknowns
-        What the sessions do not tell.
+        Undetermined unknowns.
     misfit : float
-        Root mean square of the normalised innovations, of the channel where it is largest; 1 where noise alone is left.
+        Largest root mean square of a channel's normalised innovations; 1 if noise alone is left.
     passes : int
     sessions : tuple of MeasuredSession
     held_out : str
-        What was not used for the fit.
+        Part that was not used for the fit.
     before, after : HeldOutResult
-        The twin's residuals there.
+        Residuals of the twin on the held-out part.
     mapped : Mapped
-        How the sensors of the sessions were read.
+        Mapping of the sensors of the sessions.
     remarks : tuple of str
-        What a reader should know.
+        Remarks for the reader.
     unusable : str
         The remark that the result must not be used; empty if it may be.
     """

@@ -1,4 +1,4 @@
-"""Measured sessions as arrays, and their rest periods: when no valve is open, and what all sensors read meanwhile."""
+"""Measured sessions as arrays, and their rest periods: times without an open valve, with the readings of all sensors."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ SHORTEST, RESTED = 1.5, 5.0  # s, of a rest period, and of all of them
 
 @dataclass(frozen=True)
 class Rigging:
-    """How the sensors of the sessions are mounted, what they read, and their noise."""
+    """Mounts, measured quantities and noise of the sensors of the sessions."""
 
     settings: Settings
     mounts: tuple[Mount | None, ...]

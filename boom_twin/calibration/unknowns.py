@@ -57,7 +57,7 @@ ASSUMED = {
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """Parameter to be estimated, with its present value (SI); `assumed`: one that is not, see `ASSUMED`."""
+    """Parameter with its present value (SI): to be estimated, or taken from the scene (`assumed`), see `ASSUMED`."""
 
     name: str
     present: float
@@ -89,7 +89,7 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Choice:
-    """Unknowns to estimate: `names`, or if there are none the usual ones and those requested by the other fields."""
+    """Choice of unknowns: `names`; without names the default ones and those requested by the other fields."""
 
     names: tuple[str, ...] = ()
     load: str | None = None  # payload or line_fill
@@ -131,6 +131,6 @@ def unknowns_of(scene: Scene, names: Sequence[str]) -> tuple[Unknown, ...]:
 
 
 def assumed_of(scene: Scene, names: Sequence[str]) -> tuple[Unknown, ...]:
-    """Return the parameters of the scene that are taken to be known but may be wrong, beside those of `names`."""
+    """Return the parameters of the scene that are not estimated but have errors, without those of `names`."""
     others = [name for name in parameter_names(scene) if name.rpartition(".")[2] in ASSUMED and name not in names]
     return tuple(Unknown(name, at, True) for name in others if (at := parameter(scene, name)) > 0.0)

@@ -1,1 +1,1 @@
-"""Alarms: of sensors by themselves, and of channels that deviate from the prediction."""
+"""Alarms about single sensors, about channels that deviate from the prediction, and about faults of the boom."""

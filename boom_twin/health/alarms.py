@@ -1,4 +1,4 @@
-"""Collect alarms from repeated `Health` reports, each once from its beginning to its end; alarms as named values."""
+"""Alarms of a run, collected from repeated `Health` reports, and alarms as named values."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ UNKNOWN = "unknown"  # cause: something else, or nothing
 
 
 class Alarms:
-    """All alarms of a run, each of them once.
+    """All alarms of a run, each once.
 
     Attributes
     ----------
     all : list of Alarm
-        In the order in which they became known, each as it was told last.
+        Newest state of each alarm, in the order in which the alarms became known.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Blocks of 0.1 s of predictions and measured samples, collected in the order of time from samples in any order."""
+"""Blocks of 0.1 s of predictions and measured samples, in the order of time, from samples in any order."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BLOCK = 100_000_000  # ns; a block waits as long for late samples
 
 
 class PredictionRows(NamedTuple):
-    """Predictions with the strokes that they followed.
+    """Predictions with the measured strokes that caused them.
 
     Attributes
     ----------

@@ -1,26 +1,25 @@
-"""Fault hypotheses of a boom, and the decision which of them is named.
+"""Evidence of fault hypotheses of a boom, and the decision which of them is named.
 
-Faults of the boom are sizes of its parameters: losses of stiffness, loads, masses. Near the boom as believed the innovations r
-of its filter are linear in these sizes x,
+A fault of the boom has a size: a loss of stiffness, a load, a mass. Near the boom as believed, the innovations r of its filter
+are linear in all sizes x,
 
     r = sum_i S_i x_i + e,    S_i = (r - r_i) / size_i,
 
-with r_i of the twin with fault i alone. A healthy boom has sizes, too: they are `Settings.scene_error`, all the time.
-Because no model of a moving boom is exact, they are `UNSTEADY` times that besides, anew in each second. One of these sizes is
-the unknown load that the filter expects: if it expects too much, it follows noise, and a heavier boom, which it moves less,
-predicts better.
+with r_i of the twin with fault i alone. The sizes of a healthy boom are not zero. Their lasting part has the standard deviation
+`Settings.scene_error`. Because no model of a moving boom is exact, a further part is `UNSTEADY` times as large and independent
+in each second. One size is the unknown load that the filter expects. If that is too large, the filter follows noise, and a
+heavier boom, which the load moves less, predicts better.
 
-A fault is a further size of one parameter from its onset on, of unknown amount. So for each onset its most likely size, the
-variance of that, and the factor by which it is more probable than no fault are in closed form (generalised likelihood ratio:
-A. Willsky and H. Jones, IEEE Trans. Automat. Control 21 (1976), 108-112). The evidence of a fault is the mean of that factor
-over all onsets.
+A fault is a further size of one parameter from its onset on, of unknown amount. For each onset, its most likely size, the
+variance of that size, and its likelihood ratio to no fault have a closed form (generalised likelihood ratio: A. Willsky and
+H. Jones, IEEE Trans. Automat. Control 21 (1976), 108-112). The evidence of a fault is the mean ratio over all onsets.
 
-A sensor whose zero drifts, or a late stream, is no size. Each second gives its twin a gain: its log likelihood less that of the
-boom as believed, and less what errors of the scene explain. Its evidence is the mean over all onsets, too.
+A sensor whose zero drifts, or a late stream, has no size. Each second gives its twin a gain: its log likelihood less that of
+the boom as believed, and less what errors of the scene explain. Its evidence is also a mean over all onsets.
 
-Two facts limit both. Successive innovations are not independent, so each counts as a share `INDEPENDENT`. And an effect outside
-all hypotheses, such as a valve that opens under a load, may dominate a second: innovations beyond their deviation count less,
-as in the filter, and no log likelihood of a second is so far below the best that it names a fault alone.
+Successive innovations are correlated, so each counts as a share `INDEPENDENT`. An effect outside all hypotheses, such as a
+valve that opens under a load, may dominate a second. So innovations beyond their deviation have less weight, as in the filter.
+The log likelihood of a second is bounded: one second cannot name a fault.
 """
 
 from __future__ import annotations
@@ -44,16 +43,16 @@ from .faults import OIL_LOSS, Fault
 INDEPENDENT = 0.35  # share of successive innovations that count as independent
 UNSTEADY = 3.0  # errors of a second over lasting ones
 MEMORY = 60  # s in which an onset is looked for
-RATIO = 1.4  # of successive trial sizes of a fault
-TINY, NONE = 1e-12, -1e3  # least information; evidence of what cannot be
+RATIO = 1.4  # ratio of successive trial sizes of a fault
+TINY, NONE = 1e-12, -1e3  # least information; evidence of an impossible fault
 
 
 class Verdict(NamedTuple):
     """Probable fault.
 
-    place : index among the faults compared. onset : stamp (ns) of the first second of its evidence. evidence : logarithm of
-    the factor by which it is more probable than no fault. sizes : most likely sizes of all sizes of the boom that are ranked,
-    by their index. ranked : the three most probable causes with their posterior probabilities, then `UNKNOWN` with the rest.
+    place : index of the fault. onset : stamp (ns) of the first second of its evidence. evidence : log likelihood ratio to no
+    fault. sizes : most likely size of each ranked fault that has one, by index. ranked : the three most probable causes with
+    their posterior probabilities, then `UNKNOWN` with the rest.
     """
 
     place: int
@@ -66,11 +65,11 @@ class Verdict(NamedTuple):
 class Likeliest(NamedTuple):
     """Most likely size of a fault.
 
-    spread : standard deviation of the sizes without each second (jackknife), which holds where the model is inexact. onset :
-    number of the first second. probability : log posterior probability density, up to a constant of all faults. agreement :
-    sum of the gains of all seconds over the root of the sum of their squares. If gains are independent and symmetric about zero
-    it exceeds t with a probability below exp(-t^2/2) (B. Efron, J. Amer. Stat. Assoc. 64 (1969), 1278-1302). No gain counts
-    more than a name needs.
+    spread : standard deviation by the jackknife over seconds, valid for an inexact model. onset : number of the first second.
+    probability : log posterior probability density, up to a constant common to all faults. agreement : sum of the gains of all
+    seconds over the root of the sum of their squares. If gains are independent and symmetric about zero, it exceeds t with a
+    probability below exp(-t^2/2) (B. Efron, J. Amer. Stat. Assoc. 64 (1969), 1278-1302). Each gain is bounded by the
+    evidence that a name needs.
     """
 
     size: float
@@ -81,7 +80,7 @@ class Likeliest(NamedTuple):
 
 
 class Scores(NamedTuple):
-    """What the innovations of a second tell of sizes x: their log likelihood is slopes . x - x . information . x / 2."""
+    """Log likelihood of the innovations of a second as a function of sizes x: slopes . x - x . information . x / 2."""
 
     slopes: Array
     information: Array
@@ -90,7 +89,7 @@ class Scores(NamedTuple):
 def scores(believed: Innovations, twins: Sequence[Innovations], sizes: Sequence[float]) -> Scores:
     """Return the scores of a second from the innovations of the boom as believed, and of twins with faults of these sizes.
 
-    Innovations are weighted as by Student's t in the filter. A channel counts if all twins took as many of its readings.
+    Innovations have the weights of Student's t, as in the filter. A channel counts if all twins took as many readings of it.
     """
     alike = np.all([each.counts == believed.counts for each in twins], axis=0)
     taken = (np.arange(believed.values.shape[1]) < believed.counts[:, None]) & alike[:, None]
@@ -109,18 +108,18 @@ class Evidence:
     scene : Scene
     faults : sequence of Fault
     settings : Settings
-        With the posterior probability required to name a cause, and the errors of the scene.
+        They have the posterior probability required to name a cause, and the errors of the scene.
     errors : sequence of float
-        Sizes that healthy booms seem to have, standard deviation of each.
+        Standard deviation of each size in healthy booms.
     certain : float
-        Smallest size of a fault that is told, over that.
+        Smallest size of a fault that can be named, in these standard deviations.
     named : collection of str
         Causes of named faults: their sizes may grow or shrink.
 
     Attributes
     ----------
     sure : float
-        Logarithm of the odds that a name needs.
+        Logarithm of the odds required to name a cause.
     """
 
     def __init__(
@@ -199,7 +198,7 @@ class Evidence:
         return sizes, np.where(self._is_fault, factors, NONE), explained
 
     def _above(self, sizes: Array, ratio: Array) -> Array:
-        """Return how much more probable sizes are above the least ones than they were before; logarithm of the factor."""
+        """Return the log ratio of posterior to prior probability that each size exceeds its smallest value."""
         from scipy.special import log_ndtr  # not at the start of every twin
 
         means, deviations = sizes * ratio / (1.0 + ratio), self._sizes / np.sqrt(1.0 + ratio)
@@ -208,7 +207,7 @@ class Evidence:
         return np.asarray(after - log_ndtr(-self._least / self._sizes))
 
     def postpone(self, place: int, evidence: float) -> None:
-        """Leave out a sensor or a lag whose size is not sure until its evidence has grown by what a name needs."""
+        """Leave out a sensor or a lag of uncertain size until its evidence has grown by `sure`."""
         self._needed[place] = evidence + self.sure
 
 
@@ -218,11 +217,11 @@ def likeliest(size: float, least: float, sure: float, course: Callable[[float], 
     Parameters
     ----------
     size : float
-        First trial, and the standard deviation that sizes have before anything is read.
+        First trial, and prior standard deviation of the size.
     least : float
-        Where to end if smaller sizes are ever more likely.
+        Smallest trial, if likelihood grows towards small sizes.
     sure : float
-        Gain of a second that counts at most.
+        Upper bound on the gain of a second.
     course : callable
         Size -> log likelihood of each second since a possible onset, shape (k,).
 

@@ -1,4 +1,4 @@
-"""Monitor of cylinders that creep: their lengths change slowly and evenly, as an operator hardly moves them.
+"""Monitor of cylinders that creep: their lengths change slowly and evenly, unlike a move by an operator.
 
 A leak makes a cylinder creep, and its joint turns. If the angle sensor shows no turn, the stroke transducer drifts.
 """
@@ -24,12 +24,12 @@ CREPT = 4e-3  # m, least change of length for an alarm: a softening oil spring c
 
 
 class CreepMonitor:
-    """Monitor of mean lengths and angles, one second after the other.
+    """Monitor of mean lengths and angles of each second.
 
     Attributes
     ----------
     creeping : dict of int to int
-        By cylinder (from 0) that creeps, since when (ns).
+        Onset (ns) by creeping cylinder (from 0).
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -1,4 +1,4 @@
-"""Monitor of lasting deviations of a stream from the prediction, in the stream's unit. It infers no cause."""
+"""Monitor of lasting deviations of a stream from the prediction, in the unit of the stream, without a cause."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SETTLED = round(3.0 * WINDOW / NANO)  # ns below that share before it ends: a me
 
 
 class DeviationMonitor:
-    """Monitor of the slow means of one stream's residuals, with the limits of the settings."""
+    """Monitor that compares slow means of one stream's residuals with the limits of the settings."""
 
     def __init__(self, stream: Stream, scene: Scene, settings: Settings) -> None:
         self._stream, self._names = stream, channels_of(len(scene.joints))[stream]

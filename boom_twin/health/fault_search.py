@@ -1,8 +1,8 @@
 """Fault twins: one twin for each fault hypothesis, and one of the boom as believed, on the same samples.
 
 The filter of a twin gives its innovations and the log likelihood of all readings (`BoomPredictor.evidence`). A fault twin has a
-scene with one fault, or lets a sensor's zero drift. `causes` decides which fault is probable; further twins find its size. A
-named fault becomes part of the boom as believed. So a second fault, and the end of the first, are named in the same way.
+scene with one fault, or lets a sensor's zero drift. `causes` decides which fault is probable. Further twins find its size. A
+named fault becomes part of the boom as believed. So a second fault, and the end of the first, are found in the same way.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .creep import SPAN, CreepMonitor
 from .faults import Fault, Follower, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
 from .sensor_check import CAME_BACK, Flags
 
-IMPOSSIBLE = -1e9  # log likelihood of a boom that cannot be
+IMPOSSIBLE = -1e9  # log likelihood of a boom whose twin fails
 DELAY = 2  # s from the end of a second to its verdict
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
 WARM_UP = 10  # s of recent samples that new twins take first: they know neither motion nor zeros when they start
@@ -53,7 +53,7 @@ class FaultSearch:
     make : callable
         Hypothesis -> its twin.
     settings : Settings
-        With `name_odds` and `scene_error`.
+        `name_odds` and `scene_error` are used.
     reads : StrokeReading
         Quantity that drives the model.
     """
@@ -76,9 +76,9 @@ class FaultSearch:
         self._begin()
 
     def _begin(self) -> None:
-        """Make twins of the boom as believed, without each named lag, and with each other fault.
+        """Make twins of the boom as believed, of that boom without each named lag, and of that boom with each other fault.
 
-        A named size of the boom has grown or shrunk in its twin.
+        The twin of a named fault that has a size lets that size grow or shrink.
         """
         known = tuple(self._named)
         causes = {fault.cause for fault in known if not fault.is_size}
@@ -102,7 +102,7 @@ class FaultSearch:
         return each, twin
 
     def _believe(self, fault: Fault, place: int = 0) -> None:
-        """Let all twins go on if a sensor is off, with twin `place` as believed, or right (0); else begin anew."""
+        """Add a named fault (twin `place`) to the boom as believed, or remove it (0); restart all twins unless a sensor is off."""
         if fault.kind != "off":
             return self._begin()
         channels = hypothesis(self._scene, (fault,)).doubted
@@ -186,9 +186,9 @@ class FaultSearch:
     def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
         """Name the fault of a verdict, change its size, or end it; return its alarm if it begins or ends.
 
-        Far from the boom as believed innovations are not linear in sizes. So all ranked ones are sized by twins, and the fault
-        is named if no other is as likely, each at its own size. Otherwise all are sized again once the evidence has grown by
-        what a name needs.
+        Far from the boom as believed, innovations are not linear in sizes. So twins find the size of each ranked fault. The
+        fault is named if no other is as likely, each at its own size. Otherwise all are sized again once the evidence has grown
+        by the odds required for a name.
         """
         fault, begin = self._faults[verdict.place], verdict.onset
         if fault in self._named:  # a lag
@@ -223,9 +223,9 @@ class FaultSearch:
         return [alarm] if named.is_told else []
 
     def _may_leak(self, fault: Fault, age: int) -> bool:
-        """Return True if what looks like a softer spring since `age` (ns) may be a leak, or a stroke transducer that is off.
+        """Return True if an apparent softer spring of this `age` (ns) may be a leak, or a stroke transducer that is off.
 
-        A leak would show within `SPAN`. A joint's sensor that is off may be that transducer.
+        A leak would show within `SPAN`. A named sensor fault of the joint may be one of its stroke transducer.
         """
         if not fault.cause.startswith("cylinder_"):
             return False
@@ -234,7 +234,7 @@ class FaultSearch:
         return is_off or number - 1 in self._creep.creeping or age < SPAN * SECOND
 
     def _changed_size(self, named: Fault, change: Fault, spread: float, onset: int) -> list[Alarm]:
-        """Change the size of a named fault; if hardly any is left it has ended: return its alarm."""
+        """Change the size of a named fault; if the rest is that of a healthy boom, end the fault and return its alarm."""
         left = named.changed_by(change)
         if abs(left.size) < self._certain * math.hypot(spread, usual_size(self._scene, left, self._settings.scene_error)):
             return self._ended(named, onset)
@@ -249,7 +249,7 @@ class FaultSearch:
         return [alarm] if fault.is_told else []
 
     def _back_again(self) -> Fault | None:
-        """Return a named sensor fault whose zero is nearly back at its value before the onset."""
+        """Return a named sensor fault whose zero has nearly returned to its value before the onset."""
         for fault in self._named:
             if fault.kind == "off":
                 axis, before = self._zeros_before[fault.cause]
@@ -259,10 +259,10 @@ class FaultSearch:
         return None
 
     def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float, int, float] | None:
-        """Return a fault of the most likely size, its deviation, its onset, not before `onset` (ns), and its log posterior.
+        """Return the fault of the most likely size, the size's deviation, the onset (from `onset` on, ns), the log posterior.
 
-        None if the size is not surely above that of healthy booms, if too few seconds agree, or if a force's is
-        below the set deviation.
+        Return None if the size is not certainly above that of healthy booms, if the seconds do not agree, or if the size of a
+        force fault is below `Settings.force_deviation`.
         """
         usual = usual_size(self._scene, fault, self._settings.scene_error)
         if fault.kind == "off":
@@ -293,8 +293,8 @@ class FaultSearch:
     def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float, float]:
         """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), the standard deviation, the drift.
 
-        An angle sensor has no zero before, so its change may be older than the evidence. The drift is the change in the newest
-        `DELAY`: a zero that still drifts has changed by as much again when the verdict comes.
+        The zero of an angle sensor counts from 0, because its change may be older than the evidence. The drift is the change in
+        the newest `DELAY`. A zero that still drifts will have changed by as much again when the verdict comes.
         """
         doubted, before = hypothesis(self._scene, (fault,)).doubted, tuple(np.zeros((3, 1)))
         zeros = [(stamp, twin.zeros(doubted)) for stamp, twin in self._repeated(fault)]

@@ -1,7 +1,7 @@
-"""Seconds of samples for the fault twins, and the alarms of these when they are due.
+"""Buffer between a twin and its fault twins: collects seconds of samples, and returns the alarms when they are due.
 
-The twins take a second of samples at a time, in a thread of a replay, and in a process beside a live node: the samples of the
-rig must not wait for their Python code. A verdict is given `DELAY` after that second, so both give it with the same sample.
+Fault twins take a second of samples at a time. They run in a thread of a replay, or in a process beside a live node, so that
+samples of the rig do not wait for them. A verdict is given `DELAY` after its second, with the same sample in node and replay.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ SPACING = 18_000_000  # ns, least time between samples of a stream: 50 Hz suffic
 
 
 class FaultTwins:
-    """Samples of each second for a `FaultSearch`, and its alarms when they are due.
+    """Buffer of samples of each second for a `FaultSearch`, and of its alarms until they are due.
 
-    `is_live`: the search runs in another process, in one thread, and the caller must not wait. On a busy processor verdicts
-    then come later than `DELAY`. While `MEMORY` seconds wait, further ones are left out: a pause in the samples to the twins.
-    Other parameters: see `FaultSearch`.
+    `is_live`: the search runs in one thread of another process, and the caller does not wait. On a busy processor verdicts
+    then come later than `DELAY`. While `MEMORY` seconds wait, further seconds are left out. Other parameters: see
+    `FaultSearch`.
     """
 
     def __init__(

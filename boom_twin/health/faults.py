@@ -1,4 +1,4 @@
-"""Faults of a boom, the booms that have them, and how they are told."""
+"""Faults of a boom, hypotheses (booms with faults), and the figures that an alarm states about a fault."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Fault(NamedTuple):
     cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off``, ``late``,
     ``heavier`` of a section, or ``quieter``: less unknown force at the tip than the filter expects. size : relative loss, kg,
     kg/m, s, relative mass; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis ``off`` lets the zero drift by any
-    amount. is_told : False without an alarm: it competes for its effect.
+    amount. is_told : False if the fault raises no alarm and only competes with the others.
     """
 
     cause: str
@@ -40,12 +40,12 @@ class Fault(NamedTuple):
 
     @property
     def is_size(self) -> bool:
-        """Whether it is the size of a parameter of the boom."""
+        """True if the fault is a change of a parameter of the boom."""
         return self.kind not in ("off", "late")
 
     @property
     def unit(self) -> str:
-        """Unit of its size; empty of a share."""
+        """Unit of the size; empty for a relative size."""
         if self.kind in ("softer", "heavier", "quieter"):
             return ""
         if self.channel == "tip":
@@ -71,9 +71,9 @@ class Fault(NamedTuple):
 class Hypothesis(NamedTuple):
     """Boom with faults.
 
-    scene : with its parameters changed. payload, line_fill : additional load, kg and kg/m. doubted : channels whose zeros may
-    drift by any amount. delays : delay of the stamps of a stream, s. expects : unknown force that its filter expects, over the
-    set one.
+    scene : scene with changed parameters. payload, line_fill : additional load, kg and kg/m. doubted : channels whose zeros may
+    drift by any amount. delays : delay of the stamps of each late stream, s. expects : unknown force that its filter expects,
+    relative to `Settings.expected_load`.
     """
 
     scene: Scene
@@ -129,7 +129,7 @@ class Follower(Protocol):
         """Return the innovations since the last call."""
 
     def zeros(self, channels: Collection[str], /) -> tuple[Array, Array, Array]:
-        """Estimated zeros of sensors, their variances, and deviations by errors of the scene."""
+        """Return the estimated zeros of sensors, their variances, and deviations by errors of the scene."""
 
     def doubt(self, channels: Collection[str], /) -> None:
         """Let the zeros of these sensors drift by any amount."""
@@ -163,7 +163,8 @@ def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
 def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
     """Return all single faults that are compared for a boom.
 
-    Warm oil, which softens all cylinders, heavier sections, and a quiet tip are none, but explain readings.
+    Warm oil, which softens all cylinders, heavier sections and a quiet tip raise no alarm. They are compared because they
+    explain readings.
     """
     mass = explain(scene).mass
     found = [Fault(name, "softer", LOSS) for name in parameter_names(scene) if name.endswith((".k", ".EI", ".stiffness"))]
@@ -180,7 +181,7 @@ def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -
 
 
 def usual_size(scene: Scene, fault: Fault, error: float) -> float:
-    """Return the standard deviation of what looks like a fault in a healthy boom whose parameters are wrong by `error`.
+    """Return the standard deviation of the apparent size of a fault in a healthy boom, with parameters wrong by `error`.
 
     Independent mass errors of n equal sections turn a straight boom of mass M like a payload of `error` M / sqrt(3 n).
     """

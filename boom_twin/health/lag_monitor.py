@@ -1,7 +1,7 @@
 """Monitor of the lags of all streams behind the strokes, by the estimator of the commissioning check.
 
-A lag is reported if it explains most residuals beyond their stated deviation, and its size is known to a tenth. If all other
-streams are early by the same time, the strokes are late.
+A lag raises an alarm if it explains most residuals beyond their stated deviation, and its size is known to a tenth. If all
+other streams lead by the same time, the strokes are late.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from .alarms import change_text
 from .blocks import BLOCK, Block
 from .sensor_check import Readings
 
-LEAST = 0.025  # s, lag from which on it is an alarm: a payload or a spring that is wrong shifts vibration by less
-SIGMAS = 10.0  # standard deviations that a lag has at least: before it has been so for a while its size is a mixture
+LEAST = 0.025  # s, smallest lag of an alarm: a wrong payload or spring shifts vibration by less
+SIGMAS = 10.0  # smallest lag in standard deviations: a window across its onset gives a mixture
 EVERY = round(SPAN / (BLOCK * NANO))  # blocks between two estimates
-WINDOWS = 12 * EVERY, 6 * EVERY, 3 * EVERY  # blocks of each: shorter ones see a lag that is new
+WINDOWS = 12 * EVERY, 6 * EVERY, 3 * EVERY  # blocks of each window; a short one shows a new lag sooner
 
 
 class LagMonitor:
@@ -34,7 +34,7 @@ class LagMonitor:
         self.begin()
 
     def begin(self) -> None:
-        """Discard all readings, because the boom restarts at rest; alarms last until lags are known to be small."""
+        """Discard all readings, because the boom restarts at rest; alarms last until all lags are surely small."""
         self._number = 0
         self._means: dict[Stream, deque[tuple[int, Array]]] = {}  # of each block (ns), see `StreamReadings`
 
@@ -49,7 +49,7 @@ class LagMonitor:
         return self._newest if self._drive in self._alarms else 0.0
 
     def is_late(self, stream: Stream) -> bool:
-        """Return True if the stream and the strokes are known to be of different times."""
+        """Return True if an alarm says that the stream lags or leads the strokes."""
         return stream in self._alarms or self._drive in self._alarms
 
     def take(self, readings: Readings, failing: Mapping[Stream, NDArray[np.bool_]], block: Block) -> list[Alarm]:

@@ -34,7 +34,7 @@ class HealthMonitor:
     Parameters
     ----------
     scene : Scene
-        With its load.
+        Boom with its load.
     settings : Settings
     mounts : tuple of Mount or None
         Mounts of the angle sensors.
@@ -43,16 +43,16 @@ class HealthMonitor:
     channels : mapping of Stream to tuple of str
         Channels of every stream.
     reads : StrokeReading
-        What drives the model. Angles that do are not compared with it.
+        Quantity that drives the model. Angles that drive it are not compared with the prediction.
     places : mapping of str to Place
         See `boom_twin.Twin`.
 
     Attributes
     ----------
     blocks : BlockBuilder
-        It takes predictions and measured samples.
+        Takes predictions and measured samples.
     fault_twins : FaultTwins or None
-        They name causes.
+        Fault twins; None if no causes are named.
     """
 
     def __init__(
@@ -106,8 +106,8 @@ class HealthMonitor:
     def suspected(self) -> NDArray[np.bool_]:
         """Return which measured channels, in the order of the streams, the estimate is to leave out.
 
-        Those are the channels of sensors and streams that are known to fail. An IMU is used once its mean is known, for no
-        noise tells that its axes are wrong.
+        These are the channels of failing sensors and streams. An IMU is left out until its mean is known: its noise does not
+        show wrong axes.
         """
         unknown = {stream for stream in self._imus if self._checks[stream].slow.weight.max() < KNOWN}
         return np.concatenate(

@@ -1,4 +1,4 @@
-"""Check the readings of a stream, block by block: stuck, noisy, spikes, jumps, silence, out of range; means, motion."""
+"""Check of the readings of a stream, block by block: stuck, noise, spikes, jumps, dropout, range; means and motion."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, 
 class SensorFindings(NamedTuple):
     """Findings in one block, shape (channels,) each.
 
-    flags : by kind, as alarms name them; empty if nothing was found. jumped : steps of jumps. level : distance of the newest
-    readings from the expected ones.
+    flags : findings by kind of alarm; empty if there are none. jumped : steps of jumps. level : newest readings minus expected
+    readings.
     """
 
     flags: Mapping[str, Flags]
@@ -59,9 +59,9 @@ class SensorFindings(NamedTuple):
 class StreamReadings(NamedTuple):
     """A block of k readings.
 
-    means : (4, channels) of readings with a prediction, these predictions, variances of both, and all readings; NaN of none.
-    is_bent : True if trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by
-    second and by third differences, motion much less by third ones.
+    means : (4, channels) means of readings with a prediction, of these predictions, of the variance of their difference, and of
+    all readings; NaN without readings. is_bent : True if trusted sensors show a motion that is fast against their rate. Noise
+    gives the same variance by second and by third differences; motion gives much less by third differences.
     """
 
     rows: MeasuredRows
@@ -79,11 +79,11 @@ class SensorCheck:
     Parameters
     ----------
     sigma, resolution : float
-        Noise and rounding of its sensors, in their unit.
+        Standard deviation of the noise and step of the rounding, in the unit of the sensors.
     low, high : ndarray, shape (channels,)
-        Their range.
+        Range of the sensors.
     fastest : float
-        What the quantity may change by, per s: more is a jump of the sensor. 0 where a jump is judged by the noise alone.
+        Largest rate of the quantity, per s. A faster change is a jump of the sensor. 0: the noise alone decides about jumps.
     """
 
     def __init__(self, sigma: float, resolution: float, low: Array, high: Array, fastest: float) -> None:

@@ -1,6 +1,6 @@
-"""Monitor single sensors: findings in their readings become alarms, and an alarm ends when its finding is gone.
+"""Monitor of single sensors: findings in their readings become alarms, and an alarm ends when its finding is gone.
 
-A sensor that fails again within `AGAIN` has an intermittent contact: one alarm, until it has been well for so long.
+A sensor that fails again within `AGAIN` has one alarm, `intermittent`, until it has not failed for that time.
 """
 
 from __future__ import annotations
@@ -53,18 +53,18 @@ class SensorMonitor:
     Parameters
     ----------
     names : tuple of str
-        Of its channels.
+        Channels of the stream.
     stream : Stream
-        Its kind says which findings give an alarm.
+        Stream, whose kind of sensor decides which findings give an alarm.
     is_predicted : bool
-        Whether a model says what the sensors should read.
+        True if a model predicts the readings.
     absent : collection of str
-        Channels without a sensor, of which nothing is found.
+        Channels without a sensor, which have no findings.
 
     Attributes
     ----------
     masked, unusable : ndarray of bool, shape (channels,)
-        Channels not to be judged by, another array once these are others; those whose readings are wrong, if there are any.
+        Channels to leave out of judgements (a new array whenever they change), and channels whose readings are wrong.
     """
 
     def __init__(self, names: tuple[str, ...], stream: Stream, is_predicted: bool = True, absent: Collection[str] = ()) -> None:

@@ -1,7 +1,7 @@
-"""Alarm of a force at the tip that the model does not know and that is above a set limit: ``tip.load``.
+"""Alarm of an unknown force at the tip above a set limit: ``tip.load``.
 
-Pumps and wind are no fault. A force above the limit is an overload, an obstacle at the tip, or a load that the scene lacks.
-A force that the cylinder lengths alone contradict is none: late or wrong readings of other sensors look like that.
+Pumps and wind raise no alarm. A force above the limit is an overload, an obstacle at the tip, or a load that the scene lacks.
+A force that the cylinder lengths alone contradict raises none: late or wrong readings of other sensors look like a force.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ AFTER = round(WINDOW / NANO)  # ns from the first passing to a later one that ra
 
 
 class TipLoadMonitor:
-    """Monitor that compares the estimated force at the tip with its `limit` (N); `alarm` is not None while it lasts."""
+    """Monitor that compares the estimated force at the tip with its `limit` (N); `alarm` is the lasting alarm or None."""
 
     def __init__(self, limit: float) -> None:
         self._limit = limit

@@ -1,7 +1,7 @@
-"""Monitor of how sensors are wired: the commissioning check on the first seconds after a start, reported once.
+"""Monitor of the wiring of sensors: the commissioning check on the first seconds after a start, reported once.
 
-What is not read as declared is left out at once. Which name, unit, sign or zero it has is looked for in a thread; the answer is
-taken `DELAY` later, so a live node and a replay give it with the same sample.
+A channel that does not read as declared is left out at once. A thread looks for its name, unit, sign and zero. The result is
+taken `DELAY` later, with the same sample in a live node and a replay.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ class WiringMonitor:
     Parameters
     ----------
     scene : Scene
-        With its load.
+        Boom with its load.
     reads : StrokeReading
-        What stroke transducers read.
+        Quantity that stroke transducers read.
     mounts : sequence of Mount or None
-        Of the angle sensors.
+        Mounts of the angle sensors.
     places : mapping of str to Place
         See `boom_twin.Twin`.
     """

@@ -1,4 +1,4 @@
-"""Commissioning check of a recorded session: reads it by the names of its messages, and proposes the mapping that mends it."""
+"""Commissioning check of a recorded session: reads its messages by name, and proposes a corrected mapping."""
 
 from __future__ import annotations
 

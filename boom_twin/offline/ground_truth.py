@@ -45,10 +45,10 @@ class TipTruth:
 
 
 class TipErrors:
-    """Root mean square errors of predictions, and of the estimates beside them, that come in parts.
+    """Root mean square errors of predictions and estimates, summed over parts of a session.
 
-    The first prediction of all is at the truth's first time. Predictions outside the truth's times, as after a clock was set,
-    do not count.
+    The first prediction is at the first time of the truth. Predictions outside the times of the truth, as after a clock was
+    set, do not count.
     """
 
     def __init__(self, truth: TipTruth) -> None:

@@ -75,8 +75,8 @@ EXTREME = ("tip_displacement", "tip_position", "tip_acceleration", "moments", "s
 class HistoryBuilder:
     """Builder of a session's history from its stretches.
 
-    Of a session above `LONGEST_WHOLE`, only the rows with the least or the largest value in one of its `BINS` parts are kept,
-    and those that are shown enlarged. So curves span what all rows spanned, and memory hardly grows with the session.
+    A session above `LONGEST_WHOLE` has `BINS` parts. Its history keeps the rows with the least or largest value of a part, and
+    the rows that are shown enlarged. So curves have the full range of values, and memory hardly grows with the session.
     """
 
     def __init__(self, scene: Scene) -> None:

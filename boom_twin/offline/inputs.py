@@ -1,4 +1,4 @@
-"""Inputs of a replay: the session with its scene, mapping and settings, given or as it was recorded."""
+"""Inputs of a replay: session, scene, mapping and settings, each given or as recorded."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ USUAL = ReplayOptions()
 
 @dataclass(frozen=True)
 class ReplayInputs:
-    """Session and all that it is read with."""
+    """Session, with the scene, mapping and settings that a replay uses."""
 
     session: Session
     kept: SessionScene  # scene with its text and source

@@ -1,4 +1,4 @@
-"""Recording of a replay: predictions, a stretch of the session at a time; totals of all, and ``summary.json``."""
+"""Recording of a replay: predictions of one stretch of the session at a time, totals, and ``summary.json``."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class ResidualRows(NamedTuple):
 
 @dataclass(frozen=True)
 class Stretch:
-    """Part of a session: everything that was predicted in it."""
+    """Part of a session, with all predictions and residuals in it."""
 
     joints: int  # of the boom
     block: ReportBlock
@@ -71,7 +71,7 @@ class Stretch:
 
 
 class SessionTotals:
-    """Totals of all predictions and residuals of a session; the values themselves are not kept."""
+    """Totals over all predictions and residuals of a session, without the values themselves."""
 
     def __init__(self, joints: int) -> None:
         self.samples, self.acceleration = 0, 0.0  # predictions; largest acceleration of the tip, m/s^2
@@ -97,7 +97,7 @@ class SessionTotals:
 
 
 class ReadOut:
-    """Steps in which sensors are read out: the smallest change from one reading to the next of any sensor of a stream."""
+    """Resolution of a stream: the smallest change from one reading to the next of any of its sensors."""
 
     def __init__(self) -> None:
         self._steps: dict[int, float] = {}  # by the code of their stream
@@ -122,8 +122,8 @@ class ReadOut:
 class Recording:
     """Recording of a replay's results, in the order of the session.
 
-    `take` is given every `Stretch` of the session, which is then let go. Without it, the whole session is one, and kept.
-    `errors` is given all predictions for which the truth is known.
+    `take` receives every `Stretch` of the session, and the recording keeps none. Without `take`, the recording keeps the
+    session as one stretch. `errors` receives all predictions for which the truth is known.
     """
 
     def __init__(

@@ -49,9 +49,9 @@ class Replay(SummaryDisplay):
     summary : dict
         As in ``summary.json``.
     recording : Recording
-        Gaps, alarms and totals; predictions, residuals and health too, unless `replay_into` gave them away.
+        Gaps, alarms and totals; also predictions, residuals and health, unless `replay_into` passed them on.
     session : Session
-        What was replayed.
+        Session that was replayed.
     truth : TipTruth or None
         The tip's true motion, where the session has one (synthetic sessions of the virtual rig).
     """

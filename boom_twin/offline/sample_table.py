@@ -1,7 +1,7 @@
 """Table of a replay: one row per prediction, with readings, residuals and the estimate; CSV or Parquet.
 
-A row has what was measured up to its stamp and after that of the row before: of every channel the newest value, empty where
-there is none. So a value stands once, and that of a sensor with the stamps of the strokes stands in its own row.
+A row has the newest value of every channel since the stamp of the previous row, up to its own stamp; empty without a value. So
+a value stands once. A sensor with the stamps of the strokes has each value in the row of that stamp.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def _channel_columns(joints: int, streams: Collection[Stream], kind: str) -> dic
 
 
 class CsvFile:
-    """CSV file with a head; numbers with nine significant digits, times with nine decimals, nothing for NaN."""
+    """CSV file with a header; numbers with nine significant digits, times with nine decimals, empty for NaN."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         self._file: IO[str] = path.open("w", encoding="ascii", newline="\n")
@@ -77,7 +77,7 @@ class CsvFile:
 
 
 class ParquetFile:
-    """Parquet file; a row group for every stretch, doubles, nothing for NaN."""
+    """Parquet file with one row group for every stretch; doubles, null for NaN."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         self._arrow, parquet = _arrow()
@@ -117,9 +117,9 @@ def table_file(path: Path, columns: Sequence[str]) -> CsvFile | ParquetFile:
 
 
 class SampleTable:
-    """Builder of a replay's table, with the columns of `columns_of`; rows, shape (k, columns), go to `put`.
+    """Builder of a replay's table with the columns of `columns_of`. `put` receives rows, shape (k, columns).
 
-    `boom_twin.offline.replay.replay_into` gives stretches to its `add`.
+    `boom_twin.offline.replay.replay_into` passes stretches to `add`.
     """
 
     def __init__(self, put: Callable[[Array], object], joints: int, streams: Collection[Stream] = USUAL_STREAMS) -> None:

@@ -1,4 +1,4 @@
-"""Samples of a session in blocks, and the changes that were made while it was recorded, in the order of log times."""
+"""Samples of a session in blocks, and the recorded changes, in the order of log times."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from ..types import SENSORS, Array, Change, Sample, Stream
 
 
 class Changes:
-    """Changes of a session, each to be repeated before the stroke sample at which it took effect.
+    """Changes of a session. A replay repeats each before the stroke sample at which it took effect.
 
-    `logged` are changes with their log times (ns), in that order.
+    `logged` are changes with their log times (ns), in the order of log times.
     """
 
     def __init__(self, logged: Iterable[tuple[int, Change]]) -> None:
@@ -77,7 +77,7 @@ def topics_read(session: Session, topics: Topics) -> dict[str, str]:
 
 
 class SessionSamples:
-    """Samples of a session, many at a time; iterate once. Only the `window` of the session is read."""
+    """Iterator of the samples of a session in blocks, for one pass. Only the `window` of the session is read."""
 
     def __init__(self, session: Session, topics: Topics, joints: int, window: TimeWindow = WHOLE) -> None:
         self._session, self._topics, self._window = session, topics, window

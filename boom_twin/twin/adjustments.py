@@ -1,4 +1,4 @@
-"""Changes of a running twin: sensor zeros, the residuals they are found from, requests, and limits."""
+"""Changes of a running twin: sensor zeros, residuals that give them, requests of changes, and limits."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Col
 
 
 class SensorZeros:
-    """Zeros of all sensors, each set with the stamp from which it holds; `values` are the newest by channel (m, rad, m/s^2, N).
+    """Zeros of all sensors, each valid from a stamp on; `values` are the newest ones by channel (m, rad, m/s^2, N).
 
-    They are kept in `state`. Samples of stamps before the newest ones have those that held then.
+    `state` keeps them. A sample has the zeros that are valid at its stamp.
     """
 
     def __init__(self, state: TwinState, channels: Mapping[Stream, tuple[str, ...]], drive: Stream) -> None:
@@ -92,7 +92,7 @@ WHOLE = {kind.stem: kind.channels(0) for kind in SENSORS.values() if kind.ends a
 
 
 class ResidualBuffer:
-    """Residuals as measured minus predicted, without any zero, in the order in which they became known."""
+    """Buffer of residuals, measured minus predicted without any zero, in the order in which they became known."""
 
     def __init__(self, recent: Ring, channels: Mapping[Stream, tuple[str, ...]]) -> None:
         self._recent = recent
@@ -105,8 +105,8 @@ class ResidualBuffer:
     def zeros_of(self, sensor: str, now: int, zeros: Mapping[str, float], slope: Callable[[int], float]) -> dict[str, float]:
         """Return the zeros of a sensor, by channel, estimated from the second before `now` (ns); see `Twin.rezero`.
 
-        `zeros` are those that hold; `slope` gives stroke over angle (m/rad) of joint i, counted from 0. UsageError if it has
-        too few readings in that time.
+        `zeros` are the present zeros; `slope` gives stroke over angle (m/rad) of joint i, counted from 0. UsageError if the
+        sensor has too few readings in that time.
         """
         if sensor in WHOLE:
             return {name: self._mean(name, now) for name in WHOLE[sensor]}
@@ -130,10 +130,10 @@ class ResidualBuffer:
 
 
 class Requests:
-    """Collector of the changes requested between two stroke samples; `due` if anything waits.
+    """Collector of changes requested between two stroke samples; `due` is True if a change waits.
 
-    `settings` and `zeros` are as they will be. `from_rest` asks for a start from rest, `is_new` for a twin that knows nothing
-    of the samples before.
+    `settings` and `zeros` are the new values. `from_rest` requests a restart from static equilibrium, and `is_new` a twin
+    without knowledge of earlier samples.
     """
 
     def __init__(self, settings: Settings) -> None:

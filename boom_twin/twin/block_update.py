@@ -1,4 +1,4 @@
-"""Call the compiled update with blocks of samples, and make reports of the rows that it gives."""
+"""Driver of the compiled update: calls it with blocks of samples, and makes reports of its rows."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ _Held = tuple[_Code, tuple[Any, ...], Any]  # with boom, limits and state, and o
 
 
 class BlockUpdate:
-    """Driver of the compiled update, for regular samples.
+    """Driver of the compiled update for regular samples.
 
-    `channels`: see `boom_twin.types.channels_of`. ``deflected`` and ``unmatched`` are added to `counts`. One call
-    takes at most `capacity` samples. Unless `is_reporting`, reports are empty.
+    `channels`: see `boom_twin.types.channels_of`. The events ``deflected`` and ``unmatched`` are added to `counts`. One call
+    takes at most `capacity` samples. Without `is_reporting`, reports are empty.
     """
 
     def __init__(

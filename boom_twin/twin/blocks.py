@@ -1,4 +1,4 @@
-"""Arrays for many samples at once: the samples, and the predictions, estimates and residuals that they caused.
+"""Arrays for many samples at once: samples, and the predictions, estimates and residuals that they cause.
 
 The order of the rows is the order in which the samples were taken. Stamps are in ns.
 """
@@ -137,7 +137,7 @@ class ResidualBlock(NamedTuple):
 
 
 class Note(NamedTuple):
-    """What the report of a sample has beside numbers; fields without comment as in `Report`."""
+    """Part of a sample's report beside the arrays; fields without comment as in `Report`."""
 
     accepted: bool = True
     events: tuple[str, ...] = ()

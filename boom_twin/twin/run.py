@@ -1,4 +1,4 @@
-"""One run of the twin, from a start of the model at rest to the next one: its stamps, and its check of strokes or angles.
+"""Run of the twin, from a start of the model at rest to the next start: its stamps, and its check of strokes or angles.
 
 CHECKED, TRUSTED and OTHERS of `boom_twin.twin.state.TwinState.clock` are updated by the check.
 """

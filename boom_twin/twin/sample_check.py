@@ -1,4 +1,4 @@
-"""Samples as a program gives them: readings by name; checks of types, shapes, units and stamps, with the remedy."""
+"""Samples from a user's program: readings by name; checks of types, shapes, units and stamps, with remedies."""
 
 from __future__ import annotations
 

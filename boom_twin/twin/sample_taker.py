@@ -1,4 +1,4 @@
-"""Take the samples of a twin one by one: follow or refuse them, start and restart the model, change it between them."""
+"""Decisions about single samples of a twin: follow or refuse them, start and restart the model, apply changes between them."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ from .update import DONE, FAILED
 
 
 class SampleTaker:
-    """State and model of a twin, and what single samples do to them; `boom_twin.twin.twin.Twin` is the public side."""
+    """State and model of a twin, changed by single samples; `boom_twin.twin.twin.Twin` is the public interface."""
 
     _boom: BoomPredictor
 

@@ -1,7 +1,7 @@
-"""Check the stamps of strokes: tell regular samples from stray ones, pauses, a time that was set back, and a second source.
+"""Check of stroke stamps: regular and stray stamps, pauses, a clock that was set back, a second source.
 
-`StampCheck` follows one line of stamps and notes another one beside it. `event_of` decides on a stroke sample that is not the
-next one of its line: follow it, refuse it, or continue with the other line.
+A line is the sequence of stamps of one source. `StampCheck` follows one line and notes another line beside it. `verdict_on`
+judges a stroke sample that is not the next one of its line: follow it, refuse it, or continue with the other line.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ SURPRISE = 0.1  # tolerance of strokes that go on: share of the fastest cylinder
 
 
 class StampCheck:
-    """Line of stamps that is followed, and another line that may replace it. A line is the sequence of stamps of one source.
+    """Line of stamps that is followed, and another line that may replace it.
 
     A sample whose stamp steps ahead or back has no effect, and begins another line. If the next samples continue the old line,
-    it was stray. If they continue the other line, time has stepped, and that line is followed from then on. After a stray
-    stamp within the last second there may be two sources. Then the other line must continue alone for longer.
+    the stamp was stray. If they continue the other line, the clock was set, and that line is followed from then on. After a
+    stray stamp within the last second there may be two sources. Then the other line must continue alone for longer.
 
-    `is_second` is True if the other line was seen before, while the followed one went on: there are two sources.
+    `is_second` is True if both lines continue: there are two sources.
     """
 
     def __init__(self, settings: Settings, state: TwinState, stream: int) -> None:
@@ -121,7 +121,7 @@ def _is_continuous(boom: BoomPredictor, before: Array, strokes: Array, span: flo
 
 
 class Verdict(NamedTuple):
-    """Event of a stroke sample, empty for a regular one, and what becomes of it: followed, or noted as of another line."""
+    """Event of a stroke sample (empty for a regular one); whether it is followed, or noted as one of another line."""
 
     event: str
     is_followed: bool = False
@@ -131,9 +131,9 @@ class Verdict(NamedTuple):
 def verdict_on(
     sample: Sample, values: Array, line: StampCheck, run: Run, boom: BoomPredictor, limits: Limits, settings: Settings
 ) -> Verdict:
-    """Return how to treat a stroke sample that is not the next one of its line. `values` (n,) are without zeros, m.
+    """Return the verdict on a stroke sample that is not the next one of its line. `values` (n,) are without zeros, m.
 
-    Its line is another one if that has been confirmed: after a pause (``gap``), or from rest (``restart``, ``jump back``).
+    A confirmed other line is followed after a pause (``gap``) or from rest (``restart``, ``jump back``).
     """
     span = sample.stamp - run.newest
     if 0 <= span < SHORTEST_STEP:

@@ -1,4 +1,4 @@
-"""The twin: samples of the rig in, predictions and residuals out. No ROS, no files, no clock."""
+"""Digital twin of a boom: samples of the rig in, predictions and residuals out. No ROS, no files, no clock."""
 
 from __future__ import annotations
 
@@ -33,44 +33,44 @@ class Twin(SampleTaker):
     settings : Settings, optional
         Noise of the sensors, tuning of the estimator, limits on time.
     mounts : sequence of Mount or None, optional
-        Of every joint's angle sensor: None is an encoder of the joint (the default), else an inclinometer, see
+        Mount of every joint's angle sensor: None for an encoder of the joint (the default), else that of an inclinometer, see
         `boom_twin.deviation.sensor_model.Mounting`.
     health : bool
-        Judge the rig's health, see `Report.health`.
+        True if the rig's health is judged, see `Report.health`.
     reads : StrokeReading
-        What drives the model: cylinder lengths, which include the compression of the oil; drives, which do not, in sessions
-        before 0.2.0; or the angles of the joints, of a boom without stroke transducers.
+        Quantity that drives the model. Cylinder lengths include the compression of the oil. Drives, in sessions before 0.2.0,
+        do not. Joint angles drive a boom without stroke transducers.
     absent : collection of str
-        Channels without a sensor, such as ``joint_3``: no reading of them is missed.
+        Channels without a sensor, such as ``joint_3``: their missing readings raise no alarm.
     doubted : collection of str
         Channels of angle sensors, of forces and of the IMU whose zeros may drift by any amount.
     causes : bool
-        With `health`, causes of faults are named, see `boom_twin.health.fault_search`.
+        True if causes of faults are named (with `health`), see `boom_twin.health.fault_search`.
     is_live : bool
-        True in a live node: the fault twins run in a process of their own, and `update` does not wait for them.
+        True in a live node: fault twins run in another process, and `update` does not wait for them.
     places : mapping of str to Place, optional
-        Of sensors that have one, such as ``imu_2``. The tip IMU is at the tip if it is not among them.
+        Places of sensors, such as ``imu_2``. The tip IMU is at the tip by default.
     lagging : collection of Stream
-        Streams whose stamps are late, or early, by a time that is not known. It is estimated, see `clocks`.
+        Streams with an unknown lag or lead of their stamps. It is estimated, see `clocks`.
     is_follower : bool
-        True for a fault twin: its samples have been checked, and their reports are empty.
+        True for a fault twin: its samples are already checked, and their reports are empty.
 
     Attributes
     ----------
     mounts : tuple of Mount or None
-        As given, one for every joint.
+        One for every joint.
     counts : Counter
-        How often each of `boom_twin.twin.blocks.EVENTS` happened.
+        Number of each event of `boom_twin.twin.blocks.EVENTS`.
     requests : Requests
-        What is asked while samples come: another load, other limits, a start from rest. It takes effect with the next full
-        stroke sample, which `Report.change` tells.
+        Requested changes: another load, other limits, a restart from static equilibrium. They take effect with the next full
+        stroke sample, whose `Report.change` states them.
     judge : HealthMonitor or None
-        Of the rig's health; None without `health`.
+        Monitor of the rig's health; None without `health`.
 
     Notes
     -----
-    Predictions depend only on accepted samples that drive the model. All other samples correct the estimate and give residuals,
-    each against the prediction interpolated at its own stamp, in whatever order samples arrive.
+    Predictions depend only on accepted samples that drive the model. All other samples correct the estimate and give residuals.
+    A residual refers to the prediction interpolated at its own stamp, in whatever order samples arrive.
     """
 
     def __repr__(self) -> str:

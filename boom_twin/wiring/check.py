@@ -1,8 +1,8 @@
 """Commissioning check of a window of readings: channels that are not wired as declared, and their corrected declaration.
 
-An explanation gives each stroke a name, unit, sign and zero. It tells the boom at rest, and the readings of all other
-sensors. The explanation with the least cost wins. A channel is determined if every explanation and hypothesis that reads it
-in another way costs `SURE` nats more.
+An explanation gives each stroke a name, unit, sign and zero. So it determines the boom at rest, and the expected readings of
+all other sensors. The explanation with the least cost is chosen. A channel is determined if every explanation and hypothesis
+with another reading of it costs `SURE` nats more.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ class Verdict(NamedTuple):
     stream: Stream
     channel: str
     declared: Channel
-    best: Channel | None  # most likely way to read it, None if no name is left for it
+    best: Channel | None  # most likely reading, None if no name is left for the channel
     margin: float  # nats by which every other way is less likely
-    is_wrong: bool  # it is not read as declared
+    is_wrong: bool  # the declaration is wrong
     is_explained: bool = True  # `best` explains the readings
     has_no_gravity: bool = False  # the driver of an IMU removes gravity
 
@@ -89,7 +89,7 @@ class Checked(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """Best ways to read one stream under an explanation, by channel as in `Verdict`; `cost` is in nats."""
+    """Best readings of one stream under an explanation, by channel as in `Verdict`; `cost` is in nats."""
 
     cost: float
     best: tuple[Channel | None, ...]

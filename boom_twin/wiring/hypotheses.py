@@ -33,7 +33,7 @@ TAU = 2.0 * math.pi
 
 
 class Cube(NamedTuple):
-    """Costs of the readings of one stream, other than unit and sign (see `common_costs`); arrays (n, names, hypotheses)."""
+    """Costs of reading one stream, without those of unit and sign (see `common_costs`); arrays (n, names, hypotheses)."""
 
     costs: Array
     channels: Mapping[tuple[int, int, int], Channel]  # way to read a channel under a hypothesis

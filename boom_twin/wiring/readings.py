@@ -141,8 +141,8 @@ def lag_of(stamps: NDArray[np.int64], read: Array, expected: Array, variances: A
 def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, variances: Array, guess: float = 0.0) -> Lag:
     """Return the lag of readings behind expected ones, as `lag_of`, by Gauss-Newton from a guess (s).
 
-    Each channel counts by what is left of it, beside its expected variance: what the prediction states as its error is no
-    lag. The scatter among spans gives the deviation.
+    The weight of a channel falls with its residual and its expected variance, so the stated error of the prediction is not
+    taken for a lag. The scatter among spans gives the deviation.
     """
     if (stamps[-1] - stamps[0]) * NANO < FEWEST * SPAN:
         return Lag(0.0, math.inf)
@@ -168,7 +168,7 @@ def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, variances:
 
 
 class _Residuals:
-    """Residuals of readings to the expected ones of another time, less their means in spans of `SPAN`; see `lag_of`."""
+    """Residuals of readings to those expected at another time, less their means in spans of `SPAN`; see `lag_of`."""
 
     def __init__(self, stamps: NDArray[np.int64], read: Array, expected: Array, variances: Array) -> None:
         self._least = variances.sum(axis=0) + 1e-300
@@ -208,7 +208,7 @@ class Expected(NamedTuple):
 
 
 class RestModel:
-    """Model of a scene, with its load, at rest; `reads` is what the strokes are. For `places` see `boom_twin.Twin`."""
+    """Model at rest of a scene with its load; `reads` is the quantity of the strokes. For `places` see `boom_twin.Twin`."""
 
     def __init__(self, scene: Scene, reads: StrokeReading, places: Mapping[str, Place] = NO_PLACES) -> None:
         self.scene, self._joints = scene, RigidJoints(scene)
