@@ -86,7 +86,7 @@ class ModelWatch:
             judge.fault(Level.WARN, f"waiting for {self._drive}")
         elif silent > stale_after:
             judge.note({"no_prediction_s": silent})
-            judge.fault(Level.ERROR, f"no prediction, though {self._drive} come{self._why(counts, words)}")
+            judge.fault(Level.ERROR, f"no prediction, although {self._drive} arrive{self._why(counts, words)}")
         elif self._is_deflected:
             judge.fault(Level.WARN, f"deflected: {words.get('deflected', '')}")
         if self._predicted_at == now:
@@ -110,7 +110,7 @@ class ModelWatch:
         load = self._busy / span if span > 0.0 else nan
         means = (self._busy / steps, self._longest, span / steps) if steps else (nan, nan, nan)
         judge.note(dict(zip(("step_mean_s", "step_longest_s", "step_budget_s"), means, strict=True)))
-        told = "the model takes most of the time there is: end other work of this computer, or lower the strokes' rate"
+        told = "the model takes most of the available time: end other work of this computer, or lower the strokes' rate"
         judge.check("load", load, Bounds(thresholds.load_warn, thresholds.load_error), told)
         if steps:
             self._predicted_at = now
@@ -227,7 +227,7 @@ class ResidualWindow:
             rms, mean, largest = sqrt(sum(squares) / count), sum(sums) / count, max(peaks)
         window = min(thresholds.residual_window, now - self._since)
         told = "larger than noise explains"
-        told += "; health finds no fault in that" if is_judged and alarm is None else ""
+        told += "; health finds no fault in these residuals" if is_judged and alarm is None else ""
         if alarm is not None:
             judge.fault(*alarm)
         bounds = Bounds(thresholds.residual_warn, nan if is_judged else thresholds.residual_error)

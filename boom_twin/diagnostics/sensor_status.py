@@ -190,7 +190,7 @@ def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats
     """
     thresholds, unit = judge.at.thresholds, sensor.unit
     if not stats.stamp and not sensor.required and isnan(stats.missing):  # no message, not even one that is left out
-        return judge.finish("not there; optional")
+        return judge.finish("absent; optional")
     judge.note({f"value_{unit}": stats.value, "rate_Hz": stats.rate})
     judge.check_age(age, "no reading" if stats.stamp else "no reading yet")
     period = 0.0 if isnan(stats.rate) or stats.rate == 0.0 else 1.0 / stats.rate

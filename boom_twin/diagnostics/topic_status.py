@@ -61,7 +61,7 @@ def topic_status(
     judge.note({"publishers": len(publishers.names), "publisher_names": ", ".join(publishers.names)})
     publishers.warn(judge)
     if stream.newest is None and not is_required:
-        return judge.finish("not there; optional")
+        return judge.finish("absent; optional")
     told = "silent" if stream.newest is not None else "nothing received yet"
     if stream.newest is None and len(publishers.names) > len(publishers.incompatible):
         told += f"; though a publisher is there. {OTHER_USER}"
@@ -129,7 +129,7 @@ class ReceptionWatch:
         for name, each in topics.items():
             self._check(judge, name, each)
         self._before = dict(topics)
-        return judge.finish("all that arrives is read at once")
+        return judge.finish("every message is read at once")
 
     def _check(self, judge: ComponentJudge, name: str, each: Reception) -> None:
         before, thresholds = self._before.get(name, Reception()), judge.at.thresholds
@@ -139,10 +139,10 @@ class ReceptionWatch:
         published = each.received - before.received + lost
         share = (lost + dropped) / published if published else nan
         judge.note({f"{name} {key}": getattr(each, key) for key in ("received", "lost", "dropped", "waiting")})
-        told = f"{name}: messages never arrived, or gave way to newer ones"
+        told = f"{name}: messages never arrived, or were dropped for newer ones"
         judge.check(f"{name} unread_share", share, Bounds(thresholds.unread_warn, thresholds.unread_error), told)
         judge.note({f"{name} latency_s": each.latency})
-        told = f"{name}: messages wait for their turn: too many come, or the model is too slow"
+        told = f"{name}: messages wait for their turn: too many arrive, or the model is too slow"
         judge.check(f"{name} wait_s", each.wait, Bounds(thresholds.wait_warn, thresholds.wait_error), told)
         if not each.is_numbered:
             judge.note({f"{name} lost": "unknown: numbers of several publishers, or of one that started anew"})

@@ -102,7 +102,7 @@ class FaultSearch:
         return each, twin
 
     def _believe(self, fault: Fault, place: int = 0) -> None:
-        """Add a named fault (twin `place`) to the boom as believed, or remove it (0); restart all twins unless a sensor is off."""
+        """Add a named fault (twin `place`) to the boom as believed, or remove it (0); restart twins unless a sensor is off."""
         if fault.kind != "off":
             return self._begin()
         channels = hypothesis(self._scene, (fault,)).doubted

@@ -77,7 +77,7 @@ LOAD = "a load at the tip moves the boom"
     ("is_judged", "level", "words"),
     [
         (False, Level.ERROR, "larger than noise explains"),
-        (True, Level.WARN, "larger than noise explains; health finds no fault in that"),
+        (True, Level.WARN, "larger than noise explains; health finds no fault in these residuals"),
     ],
 )
 def test_a_residual_that_is_explained_is_none_and_else_a_warning_at_most_where_health_is_judged(

@@ -24,7 +24,7 @@ def received(*looks: Reception) -> Status:
 
 def test_messages_that_never_arrive_give_way_or_wait() -> None:
     well = received(*(Reception(200 * k, 0, 0, 0, 0.001, 0.004) for k in range(4)))
-    assert (well.level, well.message) == (Level.OK, "all that arrives is read at once")
+    assert (well.level, well.message) == (Level.OK, "every message is read at once")
     keys = ("received", "wait_s", "latency_s")
     assert [well.values[f"cylinder_strokes {key}"] for key in keys] == [600, 0.001, 0.004]
     some = received(*(Reception(1000 * k, 20 * k, 30 * k, 0, 0.001) for k in range(4)))

@@ -61,7 +61,7 @@ STUCK, RANGE = (alarm_text("joint_1", kind, None) for kind in ("stuck", "range")
         ({}, 2.5, Level.STALE, "no reading", SENSOR),
         ({"stamp": 0}, 2.5, Level.STALE, "no reading yet", SENSOR),
         ({"stamp": 0}, 0.5, Level.OK, "waiting for a reading", SENSOR),
-        ({"stamp": 0, "missing": nan}, 99.0, Level.OK, "not there; optional", OPTIONAL),
+        ({"stamp": 0, "missing": nan}, 99.0, Level.OK, "absent; optional", OPTIONAL),
         (
             {"stamp": 0, "missing": 1.0},
             9.0,

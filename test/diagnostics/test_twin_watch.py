@@ -97,7 +97,7 @@ def test_a_healthy_rig(rig: Rig) -> None:
     ]
     names += [*(f"residual {name}" for name in JOINTS)]
     assert list(found) == names
-    assert found["tip_imu"].message == "not there; optional"
+    assert found["tip_imu"].message == "absent; optional"
     model = found["model"].values
     assert (model["predictions"], model["failures"]) == (500, 0)
     assert model["load"] == pytest.approx(0.02) and model["step_budget_s"] == pytest.approx(0.01)
@@ -153,7 +153,7 @@ def test_strokes_that_give_no_prediction_are_an_error_with_what_is_wrong_with_th
     monkeypatch.setattr(rig, "_report", refused)
     found = [look(3 + 100 * k) for k in range(1, 5)]
     assert found[0].level == Level.OK and found[-1].level == Level.ERROR
-    assert found[-1].message == "no prediction, though strokes come: leap (far from where it was)"
+    assert found[-1].message == "no prediction, although strokes arrive: leap (far from where it was)"
     assert found[-1].values["no_prediction_s"] == pytest.approx(4.0)
     monkeypatch.undo()
     assert look(403).level == Level.OK

@@ -51,11 +51,11 @@ def test_the_worst_lamp_is_the_state_of_all(levels: list[int], expected: str) ->
 
 def test_a_silent_node_is_stale_and_never_green() -> None:
     for statuses in (StatusTable(), table(status("boom_twin_recorder: recording"))):
-        assert overall(statuses.groups(0.0)) == (Severity.STALE, "no word from the twin")
+        assert overall(statuses.groups(0.0)) == (Severity.STALE, "no message from the twin")
     statuses = table(status("n: model"), status("n: sensor 1", ERROR), now=10.0)
     assert overall(statuses.groups(10.0 + SILENCE))[0] == Severity.ERROR
     level, reason = overall(statuses.groups(10.1 + SILENCE))
-    assert level == Severity.STALE and "no word from n" in reason
+    assert level == Severity.STALE and "no message from n" in reason
 
 
 def judge(alarms: AlarmList, time: float, *told: Alarm) -> None:

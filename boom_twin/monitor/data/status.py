@@ -86,7 +86,7 @@ class StatusTable:
             silence = now - heard
             for lamp in lamps:
                 if silence > SILENCE and not lamp.is_last:
-                    words = f"no word from {node}"
+                    words = f"no message from {node}"
                     lamp = StatusLamp(lamp.name, lamp.group, Severity.STALE, words, "silence_s", silence, SILENCE, silence)
                 found[lamp.group].append(lamp)
         return found
@@ -100,7 +100,7 @@ def overall(groups: Mapping[str, list[StatusLamp]]) -> tuple[Severity, str]:
     """Return severity and reason of all groups together; without a status of the model, nothing is well."""
     lamp = worst(lamp for lamps in groups.values() for lamp in lamps)
     if lamp is None or (lamp.level < Severity.ERROR and not groups["model"]):
-        return Severity.STALE, "no word from the twin"
+        return Severity.STALE, "no message from the twin"
     return lamp.level, "everything as expected" if lamp.level == Severity.OK else f"{lamp.name}: {lamp.reason}"
 
 

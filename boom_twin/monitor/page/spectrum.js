@@ -62,7 +62,7 @@ export class SpectrumTab {
     const rows = peaks.map(({ frequency, mode, deviation }) =>
       [frequency.toFixed(3), mode === null ? "–" : `${mode}`, mode === null ? NaN : natural[mode - 1], percent(deviation)]);
     const others = natural.map((frequency, i) => [`${t("mode")} ${i + 1}`, frequency]).filter((_, i) => !peaks.some(peak => peak.mode === i + 1));
-    const moved = this.lines.moved > 0 ? t("THE BOOM MOVED within them, a cylinder by {size} mm: the frequencies changed, \"off by\" means nothing; ", { size: (1000 * this.lines.moved).toFixed(0) }) : "";
+    const moved = this.lines.moved > 0 ? t("THE BOOM MOVED in these 40 s, a cylinder by {size} mm: the frequencies changed, \"off by\" has no meaning; ", { size: (1000 * this.lines.moved).toFixed(0) }) : "";
     const words = t(natural.length ? "dashed: the model's natural frequencies in this posture" : "the model's frequencies are not known: give --scene");
     this.htmlTable.fill(["peak, Hz", "mode", "model, Hz", "off by, %"].map(head => t(head)), [...rows, ...others.map(([name, value]) => ["", name, value, NaN])], `${t("{source}, last 40 s, segments of 8 s; ", { source: t(this.lines.source) })}${moved}${words}`);
   }
