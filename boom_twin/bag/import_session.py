@@ -143,7 +143,7 @@ def _check_spans(assignment: Assignment, read: dict[int, ReadTable], drive: Stre
     told = {number: f"{assignment.tables[number].source}: {each.span_text}" for number, each in read.items()}
     if len({each.times.is_absolute for each in read.values()}) > 1:
         remedy = "Choose the columns of dates: time in --columns FILE."
-        raise BagError(f"times since a start beside dates: {'; '.join(told.values())}. {remedy}")
+        raise BagError(f"some tables have dates, others times since a start: {'; '.join(told.values())}. {remedy}")
     by_channel: dict[str, list[tuple[int, int, int]]] = {}
     for use in assignment.used:
         by_channel.setdefault(use.channel, []).append((*spans[use.table], use.table))

@@ -66,7 +66,7 @@ def unpack(chunk: Chunk) -> bytes:
     except (McapError, ZstdError, RuntimeError) as error:
         raise McapError(f"{span}: {error}") from error
     if len(content) != chunk.uncompressed_size:
-        raise McapError(f"{span}: unpacks to another size than the {chunk.uncompressed_size} bytes that it states")
+        raise McapError(f"{span}: does not unpack to the {chunk.uncompressed_size} bytes that it states")
     if chunk.uncompressed_crc not in (0, zlib.crc32(content)):
         raise McapError(f"{span}: crc validation failed: its checksum does not fit its content")
     return content
@@ -96,7 +96,7 @@ def bounds(content: bytes) -> Iterator[tuple[int, int, int]]:
             raise McapError(f"more than {MOST_TOGETHER} records in a chunk, the most that memory holds")
         opcode, length = PREFIX.unpack_from(content, place)
         if opcode == 0:
-            raise McapError(f"record with opcode 0 at byte {place} of a chunk: there is none")
+            raise McapError(f"record at byte {place} of a chunk has opcode 0, which does not exist")
         place = start + length
         if place > size:
             raise McapError(f"record of {length} bytes at byte {start - PREFIX.size} of a chunk ends after the chunk")
@@ -133,7 +133,7 @@ def check_ends(path: Path, file: BinaryIO) -> None:
     size = path.stat().st_size
     if (start := file.read(len(MCAP0_MAGIC))) != MCAP0_MAGIC:
         if MCAP0_MAGIC.startswith(start):
-            raise BagError(f"{path}: incomplete: {size} bytes, of which nothing can be saved. Its recorder was ended at once.")
+            raise BagError(f"{path}: incomplete: {size} bytes, of which nothing can be saved. Its recorder was killed at once.")
         remedy = "Give a rosbag2 directory, or a file that ends with .mcap, .db3, .bag or .csv."
         raise BagError(f"{path}: not an MCAP file (it begins otherwise). {remedy}")
     if (ends := _footer(file, size)) is None:

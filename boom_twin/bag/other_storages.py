@@ -56,11 +56,11 @@ class SqliteFile(SessionFile):
             rows = database.execute(_MESSAGES + ("id" if clock.places else "timestamp, id"))
             for row, (channel, time, data) in enumerate(rows):
                 if channel not in self.channels or not isinstance(data, bytes) or not isinstance(time, int) or time < 0:
-                    raise BagError(f"{self.path}: a message of topic {channel!r} at {time!r} ns is none. {_REMEDY}")
+                    raise BagError(f"{self.path}: the row of topic {channel!r} at {time!r} ns is not a message. {_REMEDY}")
                 left -= len(data)
                 if left < 0:
                     raise BagError(
-                        f"{self.path}: its messages have more bytes than the file, so are not stored in it. {_REMEDY}"
+                        f"{self.path}: its messages have more bytes than the file, so they are not data of the file. {_REMEDY}"
                     )
                 place = PIECE * (row // _TOGETHER) + row % _TOGETHER
                 newest = max(newest, time + clock.shifts[bisect_right(clock.places, place)])
@@ -99,7 +99,7 @@ def summarise_sqlite(path: Path) -> SqliteFile:
 def _topic(path: Path, row: tuple[Any, ...]) -> tuple[int, str, str, str]:
     number, *texts = row
     if not isinstance(number, int) or not 0 <= number < 2**31 or not all(isinstance(text, str) for text in texts):
-        raise BagError(f"{path}: {row!r} in its table topics is no topic. {_REMEDY}")
+        raise BagError(f"{path}: row {row!r} of its table topics is not a topic. {_REMEDY}")
     return number, texts[0], texts[1], texts[2]
 
 

@@ -77,7 +77,7 @@ class SessionMetadata:
         text = _HEAD + dump({key: value for key, value in document.items() if value not in (None, "", {})})
         path = directory / FILE_NAME
         if (size := len(text.encode())) > LARGEST_FILE:
-            raise BagError(f"{path}: {size} bytes, of which {LARGEST_FILE} are read again. Shorten scene and mapping.")
+            raise BagError(f"{path}: {size} bytes, but at most {LARGEST_FILE} can be read. Shorten scene and mapping.")
         write_atomic(path, text)
 
 
@@ -124,7 +124,7 @@ def _value(path: Path, key: str, remedy: str) -> Any:
         return None
     document = read_plain(path, BagError, remedy, received=True)
     if not isinstance(document, dict | None):
-        raise BagError(f"{path}: a list or a value, not what `boom_twin record` writes. {remedy}")
+        raise BagError(f"{path}: holds a list or a value, but names with values are needed. {remedy}")
     return (document or {}).get(key)
 
 
@@ -236,8 +236,8 @@ def scene_of(session: Path, given: SceneSource | SessionScene = None) -> Session
         more = f" (and {len(error.faults) - 1} more)" if len(error.faults) > 1 else ""
         raise BagError(f"{own.source}: {error.faults[0]}{more} Give the scene by --scene.") from None
     if recorded is not None and recorded.text != digest:
-        bound = f"{own.source} has {digest[:12]}..: it was changed since the session was made"
-        oddities = [Fault("scene_sha256", recorded.text, bound, "Give the scene that is right by --scene."), *oddities]
+        bound = f"{own.source} has {digest[:12]}..: it was changed after the recording"
+        oddities = [Fault("scene_sha256", recorded.text, bound, "Give the right scene by --scene."), *oddities]
     return SessionScene(scene, own.text, own.source, tuple(oddities))
 
 

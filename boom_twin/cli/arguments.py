@@ -155,11 +155,11 @@ def _placed(kind: str, text: str, taken: set[str], scene: Scene) -> dict[str, Pl
         raise UsageError(f"{kind}@{text}: {told}")
     if kind == "moment" and not (beam and scene.is_flexible(number - 1) and beam[0] < float(at) < beam[1]):
         bends = f"bends from {beam[0]:g} to {beam[1]:g} m" if beam and scene.is_flexible(number - 1) else "is rigid"
-        raise UsageError(f"moment@{text}: section {section} {bends}; strain is read on a beam only.")
+        raise UsageError(f"moment@{text}: section {section} {bends}; strain is read on a beam only. Give another place.")
     names = FURTHER.get(kind, (f"moment_{section}",))
     if not (free := [name for name in names if name not in taken]):
         where = "on one section" if kind == "moment" else "on a boom"
-        raise UsageError(f"{kind}@{text}: one too many, at most {len(names)} of its kind are possible {where}. Leave it out.")
+        raise UsageError(f"{kind}@{text}: at most {len(names)} of this kind are possible {where}. Leave one out.")
     return {free[0]: place}
 
 

@@ -60,7 +60,7 @@ def run(args: Namespace) -> int:
     mapping = write_mapping(found, Path(args.bags[0]), args.mapping, args.out, credit, len(scene.scene.joints))
     write_scene(found, scene.scene, scene.text, args.out, credit)
     if mapping is None and (earlier := mapping_path(args.out)).exists():
-        warn(f"{earlier}: of an earlier calibration; {args.out} has no zeros of its own.")
+        warn(f"{earlier} comes from an earlier calibration; this one found no zeros for {args.out}. Remove it.")
     files = [args.out, *([mapping] if mapping else [])]
     written = [str(path) for path in files]
     print_result(args.json, as_object(found) | {"wall_s": wall, "files": written}, [*as_text(found), f"{wall:.1f} s", *written])
@@ -78,5 +78,5 @@ def _scene(args: Namespace) -> SessionScene:
     found = open_session_scene(args.bags[0], args.scene)
     for bag in args.bags[1:] if args.scene is None else []:
         if scene_of(Path(bag)).scene != found.scene:
-            raise UsageError(f"{bag}: made with another scene than {args.bags[0]}. Give the one that is right by --scene.")
+            raise UsageError(f"{bag}: its scene differs from that of {args.bags[0]}. Give the right scene by --scene.")
     return found

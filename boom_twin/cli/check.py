@@ -50,7 +50,7 @@ def run(args: Namespace) -> int:
     scene, oddities = examine(args.scene)
     sensors = None if args.sensors is None else sensors_of(args.sensors, scene)
     if args.drive == "angles" and any(stream is Stream.ANGLES for _, stream, _ in sensors or ()):
-        raise UsageError("--sensors angles: they drive the model. Name the sensors beside them.")
+        raise UsageError("--sensors angles: angles drive the model. Name only the further sensors.")
     name = args.scene or DEFAULT_NAME
     drawn = []
     if args.picture is not None:

@@ -37,7 +37,7 @@ def run(args: Namespace) -> int:
         if side.incomplete:
             warn(f"{side.name}: its session is {side.incomplete}")
     if one.scene != other.scene:
-        warn("the two were replayed with different scenes; differences may be those of the scenes")
+        warn("the two were replayed with different scenes, which may explain differences. Replay both with one scene.")
     rows = rows_of(one, other)
     print_result(args.json, flat(one, other, rows), as_text(one, other, rows))
     return 0

@@ -51,7 +51,7 @@ def run(args: Namespace) -> int:
         try:
             _play(player, args, length)
             if late := player.deliver():
-                warn(f"some listener did not acknowledge all of {', '.join(late)}: a recording of it may lack its end")
+                warn(f"a listener did not acknowledge all messages of {', '.join(late)}: its recording may lack the end")
         except KeyboardInterrupt:
             if not args.loop:
                 raise

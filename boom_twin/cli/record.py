@@ -136,7 +136,7 @@ def _with_twin_values(metadata: SessionMetadata, answers: Mapping[str, Any], fra
     if own is not None and metadata.scene is None:
         changes["scene"] = own
     elif own not in (None, metadata.scene):
-        warn("the running twin has another scene than --scene gives; session.yaml holds the one given")
+        warn("the scene of the running twin differs from --scene; session.yaml holds that of --scene")
     return replace(metadata, **changes)
 
 

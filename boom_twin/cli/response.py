@@ -123,7 +123,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     beside, sharp = 1.0 + 1e-6, 3.0  # a peak `sharp` times as high as at `beside` times its frequency is not damped
 
     if not 0.0 < args.low < args.high < float("inf"):
-        raise UsageError(f"--from {args.low:g} --to {args.high:g}: frequencies must be above 0 Hz and ascend. Give such.")
+        raise UsageError(f"--from {args.low:g} --to {args.high:g}: both must be above 0 Hz. Give the lower one first.")
     rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=modes_sought)
     natural = rest.frequencies[(rest.frequencies > args.low) & (rest.frequencies < args.high)]
     force = None if args.drive is not None else tuple(args.tip or UPWARD)

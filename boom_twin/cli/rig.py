@@ -118,7 +118,7 @@ def run(args: Namespace) -> int:
     sensors = Sensors() if args.rate is None else Sensors(args.rate)
     cylinders = _cylinders(args.pressures, scene)
     if cylinders and Stream.FORCES in recorded:
-        raise UsageError("--pressures: they are read as forces, and a cylinder has one force. Leave forces out of --sensors.")
+        raise UsageError("--pressures: pressures give the forces of cylinders. Leave forces out of --sensors.")
     wrong = [faults.parse(text) for text in args.fault]
     faults.check(wrong, scene, duration)
     _refuse_unrecorded([fault.cause for fault in wrong], args.sensors, recorded)

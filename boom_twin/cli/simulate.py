@@ -45,7 +45,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def _share(text: str) -> float:
     if (value := not_negative(text)) >= 1.0:
-        raise ArgumentTypeError(f"{text}: must be below 1, as positions of closed loops are integrated directly")
+        raise ArgumentTypeError(f"{text}: must be below 1: closed loops need numerical damping")
     return value
 
 
@@ -115,7 +115,7 @@ def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array
     table = CsvLogTable(path)
     stem = next((stem for stem in stems if f"{stem}_1_m" in table.headers), stems[0])
     if (more := f"{stem}_{n + 1}_m") in table.headers:
-        raise UsageError(f"{path}: column {more}, but the scene has {n} cylinders. Give the scene of this boom, or remove it.")
+        raise UsageError(f"{path}: column {more}, but the scene has {n} cylinders. Give another scene, or remove the column.")
     found = columns_of(table, ("t_s", *(f"{stem}_{i + 1}_m" for i in range(n))))
     return found[:, 0], found[:, 1:], stem
 
@@ -129,7 +129,7 @@ def odd_in_drive(times: Array, strokes: Array, stem: str = "stroke") -> list[str
         return []  # `simulate` refuses it
     if (usual := float(np.median(steps))) >= sparse_rows:
         found.append(
-            f"t_s goes on by {usual:g} s from row to row, {times[-1] - times[0]:g} s in all, and strokes go smoothly between. "
+            f"t_s grows by {usual:g} s from row to row, {times[-1] - times[0]:g} s in all, with smooth strokes between. "
             "If these are ms, divide them by 1000: t_s is in seconds."
         )
     speeds = np.abs(np.diff(strokes, axis=0)) / steps[:, None]
@@ -137,7 +137,7 @@ def odd_in_drive(times: Array, strokes: Array, stem: str = "stroke") -> list[str
     if speeds[row, i] > fastest_cylinder:
         found.append(
             f"line {row + 3}: {stem}_{i + 1}_m goes {strokes[row, i]:g} to {strokes[row + 1, i]:g} within {steps[row]:g} s, "
-            f"{speeds[row, i]:.3g} m/s; cylinders of booms go at less than 0.3 m/s. Check the value and the times."
+            f"{speeds[row, i]:.3g} m/s; cylinders of booms move at less than 0.3 m/s. Check the value and the times."
         )
     return found
 
@@ -156,7 +156,7 @@ def _angles_near(scene: Scene, posture: str, first: Array, are_lengths: bool) ->
         i = int(np.argmax(off))
         at_rest = " at rest" if are_lengths else ""
         raise UsageError(
-            f"stroke_{i + 1}_m = {drives[i]:.6g} in the first row{at_rest}: posture {posture} has {expected[i]:.6g}, and they "
-            f"may differ by {posture_deviation:g} m. Start in the posture, or name another."
+            f"stroke_{i + 1}_m = {drives[i]:.6g} in the first row{at_rest}: posture {posture} has {expected[i]:.6g} m, and the "
+            f"difference may be {posture_deviation:g} m. Start in the posture, or name another."
         )
     return angles

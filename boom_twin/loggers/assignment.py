@@ -188,7 +188,7 @@ def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) ->
             elif use.channel in given.columns or use.channel in here:
                 found.unused.append(ColumnUse(number, use.place, reason=f"{use.channel} is given otherwise"))
             elif _is_drive(table, use.place):
-                found.unused.append(ColumnUse(number, use.place, reason="a drive, as simulate writes it, beside its length"))
+                found.unused.append(ColumnUse(number, use.place, reason="a drive of `simulate`; its length is used"))
             elif own.count(use.channel) > 1:
                 found.unused.append(ColumnUse(number, use.place, reason=f"one of several columns that may be {use.channel}"))
                 header = table.headers[use.place]

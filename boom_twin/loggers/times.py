@@ -151,9 +151,9 @@ def _numbers(table: LogTable, rows: LogRows, cells: Times, header: str, unit: st
         if "d" in fitting and not EXCEL_DAYS[0] < values[0] < EXCEL_DAYS[1]:
             fitting.remove("d")
         if len(fitting) != 1:
-            known = f"may be in {' or '.join(fitting)}" if fitting else "are in no unit that gives 5 to 10 000 rows a second"
+            known = f"may be in {' or '.join(fitting)}" if fitting else "have no unit that gives 5 to 10 000 rows a second"
             raise BagError(
-                f"{table.source}: {header} goes on by {step:g} from row to row; the times {known}. "
+                f"{table.source}: {header} grows by {step:g} from row to row; the times {known}. "
                 "Give time: {column: .., unit: ..} in --columns FILE."
             )
         told = f"{fitting[0]} by their steps"

@@ -109,7 +109,7 @@ def _faults(document: Document, table: BoomTable) -> list[Fault]:
             found.append(document.fault(("sections", i, "wall"), section.wall, bound, "Give the thickness of one wall."))
     if table.material.rho is None:
         remedy = f"Give {meaning_of(Material, 'rho')}."
-        found.append(document.fault(("material", "rho"), ABSENT, "masses are worked out with it", remedy))
+        found.append(document.fault(("material", "rho"), ABSENT, "masses are computed from it", remedy))
     return [*found, *_pipes_of_some(document, table), *_angle_without_unit(document)]
 
 

@@ -200,7 +200,7 @@ def test_recovery_of_a_bomb_takes_little_memory(tmp_path: Path, compression: str
     zeros = bytes(LARGEST_SUMMARY)
     path = bomb(tmp_path / "bomb.mcap", zeros, compression, zlib.crc32(zeros) if is_summed else 0)
     words = refused_in_little_memory(tmp_path, "recover", path, "--out", tmp_path / "out")
-    assert "there is none" in words
+    assert "has opcode 0" in words
     assert not (tmp_path / "out").exists()
 
 

@@ -160,7 +160,7 @@ def test_further_sensors_are_recorded_with_the_mapping_that_places_them(scene: P
         (["--sensors", "imu@2:1.0"], "the boom has sections 1 to 1"),
         (["--sensors", "angles,imu@1:4"], "section 1 reaches from 0 to 3 m"),
         (["--sensors", "moment@1:1.0"], "section 1 is rigid; strain is read on a beam only"),
-        (["--sensors", "point@1:1,point@1:2,point@1:3"], "at most 2 of its kind are possible on a boom"),
+        (["--sensors", "point@1:1,point@1:2,point@1:3"], "at most 2 of this kind are possible on a boom"),
         (["--pressures"], "not every cylinder of the scene has `oil"),
         (["--pressures", "0.1:0.07", "--sensors", "forces"], "a cylinder has one force"),
     ],

@@ -36,7 +36,7 @@ def jumped(size: float) -> np.ndarray:
     [
         (TIMES[:20], STROKES[:20], ""),
         (TIMES[:20], jumped(0.02), "line 12: stroke_1_m goes "),
-        (1000.0 * TIMES[:4], STROKES[:4], "t_s goes on by 10 s from row to row, 30 s in all"),
+        (1000.0 * TIMES[:4], STROKES[:4], "t_s grows by 10 s from row to row, 30 s in all"),
     ],
 )
 def test_a_drive_likely_meant_otherwise_is_told_and_followed(

@@ -155,4 +155,4 @@ def test_a_scene_that_was_changed_is_told(five, tmp_path, capsys):
     sheet = (five / FILE_NAME).read_text()
     (bag / FILE_NAME).write_text(sheet.replace("gravity", "# by hand\n  gravity", 1) + "baseline: of 0.1.0\n")
     assert main(["info", str(bag)]) == 0
-    assert "was changed since the session was made" in capsys.readouterr().err
+    assert "was changed after the recording" in capsys.readouterr().err
