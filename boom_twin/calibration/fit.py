@@ -190,7 +190,7 @@ class Fit:
     def without(self, left_out: Sequence[int], least: Array) -> Array:
         """Return the deviations (p,) of at least `least` (p,) that fit best where those in places `left_out` stay 0.
 
-        What was fitted together cannot be taken apart: a zero that makes up for another's would be wrong without that.
+        The rest is fitted again, because an estimate that compensates a left-out one is wrong without it.
         """
         fixed = np.zeros(len(self.deviations), bool)
         fixed[list(left_out)] = True

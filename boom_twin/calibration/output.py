@@ -56,7 +56,7 @@ def write_scene(found: Calibration, scene: Scene, text: str, out: Path, credit: 
 def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path, credit: str, joints: int) -> Path | None:
     """Write the zeros of the sensors into a mapping beside the scene; return None if there are none to write.
 
-    They are added to `mapping` if given, else to the one that the session `bag` was recorded with.
+    The zeros are added to `mapping` if given, else to the mapping of the session `bag`.
     """
     if not found.zeros:
         return None

@@ -52,7 +52,7 @@ ASSUMED = {
     "beta": UnknownKind("s", 0.2, 0.0, relative=True),
     "damping": UnknownKind("N m s/rad", 0.2, 0.0, relative=True),
 }
-"""How far parameters that are not estimated may be wrong, by the last word of their names: tolerances, and damping."""
+"""Standard deviations of parameters that are not estimated, by the last word of their names: tolerances, and damping."""
 
 
 @dataclass(frozen=True, slots=True)

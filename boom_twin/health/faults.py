@@ -116,7 +116,7 @@ class Follower(Protocol):
 
     @property
     def doubts(self) -> int:
-        """How often the estimate was doubted because its tip was far off the predicted one."""
+        """Number of times that the estimate was doubted, because its tip was far off the predicted one."""
 
     @property
     def requests(self) -> Any:

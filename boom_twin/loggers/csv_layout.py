@@ -181,7 +181,7 @@ THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 @dataclass(frozen=True, slots=True)
 class CsvLayout:
-    """How a CSV file is written, with its header and its first rows."""
+    """Layout of a CSV file, with its header and first rows."""
 
     encoding: str
     separator: str

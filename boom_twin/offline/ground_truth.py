@@ -80,7 +80,7 @@ class TipErrors:
     def rms(self) -> dict[str, float]:
         """Root mean square errors of position (m) and acceleration (m/s^2), by their names in ``summary.json``.
 
-        Those of estimates are included if there are any.
+        Errors of estimates are included if there are any.
         """
         return {name: sqrt(self._squares[name] / count) for name, count in self._counts.items() if count}
 

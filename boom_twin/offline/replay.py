@@ -126,14 +126,14 @@ def replay(
     settings : Settings, optional
         Sensors' noise and tuning; by default those of the node that ran beside the recording, else the package's own.
     progress : callable, optional
-        Is given the number of messages, and gives the `ProgressBar` that is told how many were taken.
+        Takes the number of messages; returns the `ProgressBar` that receives the number read by each step.
     mapping : path, optional
-        How topics and sensors are named and read, a file like ``msg_config/topics.yaml``; by default the one that the
-        session was recorded with, else the package's own.
+        File like ``msg_config/topics.yaml`` with names and units of topics and sensors; by default that of the session, else
+        the package's own.
     changes : bool
-        Repeat what was changed while the session was recorded (load, limits, zeros, starts from rest), at the same stamps.
+        True to repeat recorded changes (load, limits, zeros, restarts from static equilibrium) at the same stamps.
     health : bool
-        Judge the rig's health, see `Report.health`.
+        True to judge the rig's health, see `Report.health`.
     window : TimeWindow, optional
         The part of the session that is replayed. The model starts at rest where that begins, whatever the boom did then; the
         times of the result count from there.

@@ -1,7 +1,7 @@
-"""A first scene from a table of the drawing: every value that is worked out stands with its formula beside it.
+"""A first scene from a table of the drawing: every computed value has its formula beside it.
 
-What no drawing tells (rigid ends, barrels, rods, damping) is estimated and marked so. The damping needs the first natural
-frequency, which `boom_twin.scene.checks.whole_boom` estimates.
+Values that no drawing gives (rigid ends, barrels, rods, damping) are estimates, and marked as such. The damping needs the
+first natural frequency, which `boom_twin.scene.checks.whole_boom` estimates.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def read_text(path: Path, kind: Kind = SCENE) -> str:
 def parse(text: str, source: str, kind: Kind = SCENE) -> Document:
     """Return the plain values of a YAML text, sequences as tuples, with the line of each; SceneError if it is not YAML.
 
-    What is YAML but not allowed here is in ``Document.faults``.
+    ``Document.faults`` has the parts that are YAML but not allowed here.
     """
     try:
         reader = _SceneReader(text, tuple)
@@ -172,7 +172,7 @@ PLAUSIBILITY: tuple[Check, ...] = (
     sizes.moving_parts,
     geometry.clear_cylinders,
 )
-"""Of a scene without faults: parts against each other."""
+"""Checks of parts against each other, for a scene without faults."""
 
 
 DEFAULT_NAME = "default scene"

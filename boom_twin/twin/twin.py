@@ -90,7 +90,7 @@ class Twin(SampleTaker):
 
     @property
     def doubts(self) -> int:
-        """How often the estimate was doubted because its tip was far off the predicted one."""
+        """Number of times that the estimate was doubted, because its tip was far off the predicted one."""
         return self._boom.doubts
 
     @property
@@ -120,7 +120,7 @@ class Twin(SampleTaker):
         Returns
         -------
         dict of str to float
-            What its channels read too much, rad, m, m/s^2 or N; it holds from the next full stroke sample on.
+            New zeros by channel, rad, m, m/s^2 or N; valid from the next full stroke sample on.
 
         Raises
         ------
