@@ -143,7 +143,7 @@ def replay(
         Write the result bag; without it, ``output_sha256`` of the summary is None, and all else is the same.
     causes : bool
         Compare with twins of booms that have a fault, and name the one that explains the readings; see
-        `boom_twin.health.fault_search`. It takes about three times as long.
+        `boom_twin.health.fault_search`. It takes several times as long.
 
     Returns
     -------
