@@ -241,9 +241,9 @@ class Skeleton:
     pivots: Array  # inboard pivots, then the tip, m, shape (n + 1, 2)
     joints: tuple[JointPins, ...]
 
-    def point(self, section: int, x: float) -> Array:
-        """Return the point of `section` (0-based) at `x` (m) along it, m, in the model frame, shape (2,)."""
-        return np.asarray(self.pivots[section] + np.array(turned(float(self.headings[section]), x, 0.0)))
+    def point(self, section: int, x: float, y: float = 0.0) -> Array:
+        """Return a point given in the axes of `section` (0-based), m, in the model frame, shape (2,)."""
+        return np.asarray(self.pivots[section] + np.array(turned(float(self.headings[section]), x, y)))
 
 
 def rigid_chain(pivot: Array, lengths: Array, angles: Array) -> tuple[Array, Array]:
