@@ -162,7 +162,7 @@ def test_further_sensors_are_recorded_with_the_mapping_that_places_them(scene: P
         (["--sensors", "moment@1:1.0"], "section 1 is rigid; strain is read on a beam only"),
         (["--sensors", "point@1:1,point@1:2,point@1:3"], "at most 2 of this kind are possible on a boom"),
         (["--pressures"], "not every cylinder of the scene has `oil"),
-        (["--pressures", "0.1:0.07", "--sensors", "forces"], "a cylinder has one force"),
+        (["--pressures", "0.1:0.07", "--sensors", "forces"], "Leave forces out of --sensors"),
     ],
 )
 def test_what_cannot_be_is_told_before_anything_is_simulated(
