@@ -49,7 +49,6 @@ def write_scene(found: Calibration, scene: Scene, text: str, out: Path, credit: 
     note = provenance(found, credit)
     description = f"{scene.description.rstrip()}\n{note}" if scene.description else note
     wanted = found.scene.model_copy(update={"description": description})
-    out.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(out, with_end_mark(rewritten(text, scene, wanted)))
 
 

@@ -46,6 +46,7 @@ def run(args: Namespace) -> int:
     settings = open_session_settings(args.bags[0], args.params)
     names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
     choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
+    args.out.parent.mkdir(parents=True, exist_ok=True)  # before the work, which a folder that cannot be made would waste
     began = time.perf_counter()
     with closing(ProgressLine(100, "%", "calibrate")) as bar:
 

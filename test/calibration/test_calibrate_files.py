@@ -90,13 +90,20 @@ def test_it_overwrites_only_when_told(ran, source, capsys):
 
 
 def test_no_scene_is_written_without_its_zeros(ran, capsys, tmp_path, monkeypatch):
-    """The calibration is that of before, here and in the next two: what is tested is its writing."""
+    """The calibration is that of before, here and in the next three: what is tested is its writing."""
     _, arguments, calibrated = ran
     monkeypatch.setattr(run, "calibrate", lambda *given: calibrated)
     (tmp_path / "new.mapping.yaml").mkdir()
     assert main([*arguments, "--out", str(tmp_path / "new.yaml"), "--force"]) == 1
     assert "new.mapping.yaml: cannot be written" in capsys.readouterr().err
     assert not (tmp_path / "new.yaml").exists()
+
+
+def test_scene_and_mapping_go_into_a_new_folder(ran, tmp_path, monkeypatch):
+    _, arguments, calibrated = ran
+    monkeypatch.setattr(run, "calibrate", lambda *given: calibrated)
+    assert main([*arguments, "--out", str(tmp_path / "a" / "b" / "new.yaml")]) == 0
+    assert {path.name for path in (tmp_path / "a" / "b").iterdir()} == {"new.yaml", "new.mapping.yaml"}
 
 
 def test_a_file_that_comes_while_it_works_is_kept(ran, capsys, tmp_path, monkeypatch):
