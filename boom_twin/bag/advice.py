@@ -34,8 +34,7 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
     with suppress(BagError):  # the loop below tells it
         found.extend(conflicts(info.session, topics, joints, scene))
     for stream, topic in topics.inputs.items():
-        known = info.session.find(topic.name)
-        if not SENSORS[stream].lack and (known is None or known.count == 0):
+        if not SENSORS[stream].lack and not info.session.count(topic.name):
             continue
         try:
             name = check_topic(info.session, topic.name, topic.type).name

@@ -71,7 +71,7 @@ class TimeWindow:
                 yield block.chosen(slice(int(begin), int(end)))
             if end < len(block):
                 break
-        if is_empty and first is None:
+        if first is None:
             raise BagError(f"{path}: no message of the topics that a replay reads. Give their names in a mapping.")
         if is_empty:
             told = "" if self.duration is None else f" to {self.start + self.duration:g} s"

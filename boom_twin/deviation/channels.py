@@ -209,11 +209,12 @@ def measurement_of(
     mounting: Mounting,
     places: Mapping[str, Place],
     lagging: Collection[Stream] = (),
-    has_strokes: bool = True,
+    zero_sigma: float = 0.0,
 ) -> Measurement:
     """Return the measured channels of a boom whose angle sensors have this mounting and others these places, by their names.
 
-    The lag and the drift of `lagging` streams are states, and zeros of strokes that drive the model and are uncertain.
+    The lag and the drift of `lagging` streams are states. So are the zeros of strokes if `zero_sigma`, their standard deviation
+    (m), is above 0.
 
     Raises
     ------
@@ -223,8 +224,8 @@ def measurement_of(
     sites, rows, errors = _Sites(plan), list[tuple[float, ...]](), list[tuple[float, float, bool]]()
     bending = list[Array]()
     n, codes = plan.joints, {stream: code for code, stream in enumerate(Stream)}
-    stroke_zero = TIP_IMU_STATES + 2 * n if has_strokes and settings.stroke_zero > 0.0 else 0
-    errors += [(settings.stroke_zero, 0.0, False)] * n * (stroke_zero > 0)
+    stroke_zero = TIP_IMU_STATES + 2 * n if zero_sigma > 0.0 else 0
+    errors += [(zero_sigma, 0.0, False)] * n * (zero_sigma > 0.0)
 
     def add(stream: Stream, reads: int, index: int, site: int = 0, turned: float = 0.0, zero: int = 0, behind: int = 0) -> None:
         """Add a channel whose reading depends on its zero, and on as many states up to `behind` places further."""

@@ -129,11 +129,12 @@ class BoomPredictor:
         lengths, self._reads = np.array([each.length for each in scene.sections]), reads
         self.channels = channels_of(n, streams_of(places))
         mounting = mounting_of(self.plan, mounts)
-        measured = measurement_of(self.plan, settings, mounting, places, lagging, reads is not StrokeReading.ANGLE)
+        zero = 0.0 if reads is StrokeReading.ANGLE else settings.stroke_zero
+        measured = measurement_of(self.plan, settings, mounting, places, lagging, zero)
         self.posture = new_posture(self.plan, MODES, lengths, mounting, measured, reads, scene.base.inclination)
         loads = [size * weight for size in (settings.expected_load, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)]
-        kind, zero2 = SENSORS[reads.stream], 0.0 if reads is StrokeReading.ANGLE else settings.stroke_zero**2
-        noise = SensorNoise(settings.variance(kind), zero2, settings.standing(kind), settings.scene_error, *loads)
+        kind = SENSORS[reads.stream]
+        noise = SensorNoise(settings.variance(kind), zero**2, settings.standing(kind), settings.scene_error, *loads)
         self.filters = new_filters(n, MODES, measured, noise)
         self.finder = RestFinder(scene, self.plan, self.posture, reads)
         self.sensors = SensorErrors(self.posture, self.filters, self.channels)

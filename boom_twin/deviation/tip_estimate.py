@@ -43,7 +43,8 @@ FAULT_CHANCE, FAULT = 0.01, 0.03  # that a sensor is off, and by how much as an 
 @inner
 def write_tip_estimate(p, f, live, results, out):
     """Write the estimate beside the newest prediction; see `boom_twin.deviation.estimate_row.WIDTH`."""
-    n, m, size, every, load = p.drives.shape[0], p.modes[0], zero_place(p), copy_place(p), force_place(p)
+    n, m, size, load = p.drives.shape[0], p.modes[0], zero_place(p), force_place(p)
+    every = copy_place(p) if p.stroke_zero > 0 else size  # states that the tip depends on
     mean, expected = f.mean[ESTIMATE], f.mean[PREDICTION]
     renew_estimate(p, f)
     for a in range(3):

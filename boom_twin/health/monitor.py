@@ -163,8 +163,8 @@ class HealthMonitor:
     @property
     def drive_lag(self) -> float:
         """Named lag of what drives the model, s; 0 without one."""
-        named = (rank for each in self._named if each.cause == f"{self._drive.value}.delay" for rank in each.ranked[:1])
-        return self._lags.lag_of_drive or next((size for rank in named for _, size, _, _ in rank.parts), 0.0)
+        named = (part for each in self._named if each.cause == f"{self._drive.value}.delay" for part in _parts(each))
+        return self._lags.lag_of_drive or next((size for _, size, _, _ in named), 0.0)
 
     @property
     def faulty_booms(self) -> Sequence[FaultyBoom]:
@@ -175,7 +175,7 @@ class HealthMonitor:
 
     def _booms_with(self, named: Iterable[Alarm]) -> Iterator[FaultyBoom]:
         for alarm in named:
-            for kind, size, sigma, _ in (part for rank in alarm.ranked[:1] for part in rank.parts):
+            for kind, size, sigma, _ in _parts(alarm):
                 if kind in ("softer", "more", "less"):
                     each = hypothesis(self._scene, [Fault(str(alarm.cause), kind, size)])
                     load = each.load(payload=-1.0, line_fill=-1.0)
@@ -233,6 +233,11 @@ class HealthMonitor:
             return []
         newest = (raw if stream is self._drive else raw - expected)[-1] if len(raw) else None
         return monitor.take(findings, block.start, block.end, newest)
+
+
+def _parts(alarm: Alarm) -> Sequence[tuple[str, float, float, str]]:
+    """Return kind, size, standard deviation and unit of each part of the most probable cause; see `Ranked`."""
+    return alarm.ranked[0].parts if alarm.ranked else ()
 
 
 def warm_up() -> None:
