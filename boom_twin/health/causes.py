@@ -211,7 +211,7 @@ class Evidence:
         self._needed[place] = evidence + self.sure
 
 
-def likeliest(size: float, least: float, sure: float, course: Callable[[float], Array]) -> Likeliest | None:
+def likeliest(size: float, least: float, sure: float, gain: Callable[[float], Array]) -> Likeliest | None:
     """Return the most likely size by twins of larger and smaller sizes, until the likelihood falls on both sides.
 
     Parameters
@@ -222,19 +222,18 @@ def likeliest(size: float, least: float, sure: float, course: Callable[[float], 
         Smallest trial, if likelihood grows towards small sizes.
     sure : float
         Upper bound on the gain of a second.
-    course : callable
-        Size -> log likelihood of each second since a possible onset, shape (k,).
+    gain : callable
+        Size -> gain of log likelihood over that of no fault, of each second since a possible onset, shape (k,).
 
     Returns
     -------
     Likeliest or None
         None if the smallest trial is the most likely one.
     """
-    healthy = course(0.0)
 
     def gained(size: float) -> Array:
         """Return the gain of a size by onset: the sum of those of the seconds from there."""
-        return np.asarray((course(size) - healthy)[::-1].cumsum()[::-1])
+        return np.asarray(gain(size)[::-1].cumsum()[::-1])
 
     sizes = [size / RATIO, size]
     gains = [gained(each) for each in sizes]
@@ -254,7 +253,7 @@ def likeliest(size: float, least: float, sure: float, course: Callable[[float], 
         without = 0.5 * np.diff(slopes + 2.0 * curves * change, append=0.0) / (curves[0] + np.diff(curves, append=0.0))
     found = sizes[best] + change
     probability = INDEPENDENT * float(gains[best][first]) - 0.5 * (found / size) ** 2
-    own = np.clip(INDEPENDENT * (course(found) - healthy)[first:], -sure, sure)
+    own = np.clip(INDEPENDENT * gain(found)[first:], -sure, sure)
     return Likeliest(
         found, float(np.linalg.norm(without)), first, probability, float(own.sum() / max(np.linalg.norm(own), TINY))
     )

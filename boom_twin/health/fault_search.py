@@ -199,7 +199,9 @@ class FaultSearch:
         faults = {verdict.place: fault}
         for place, size in verdict.sizes.items() if fault.is_size else ():
             faults[place] = self._faults[place]._replace(size=math.copysign(self._faults[place].size, size))
-        found = {place: each for place, trial in faults.items() if (each := self._sized(trial, begin)) is not None}
+        # of size 0 all are the boom as believed
+        healthy = np.zeros(0) if fault.kind == "off" else self._course(fault._replace(size=0.0), begin)
+        found = {place: each for place, trial in faults.items() if (each := self._sized(trial, begin, healthy)) is not None}
         likely = {place: each[3] for place, each in found.items()}
         if verdict.place not in found or any(
             likely[verdict.place] - each < self._decision.sure for place, each in likely.items() if place != verdict.place
@@ -258,11 +260,12 @@ class FaultSearch:
                     return fault
         return None
 
-    def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float, int, float] | None:
+    def _sized(self, fault: Fault, onset: int, healthy: Array) -> tuple[Fault, float, int, float] | None:
         """Return the fault of the most likely size, the size's deviation, the onset (from `onset` on, ns), the log posterior.
 
-        Return None if the size is not certainly above that of healthy booms, if the seconds do not agree, or if the size of a
-        force fault is below `Settings.force_deviation`.
+        `healthy` is the log likelihood of each second of the boom as believed; a zero's size does not depend on it. Return None
+        if the size is not certainly above that of healthy booms, if the seconds do not agree, or if the size of a force fault
+        is below `Settings.force_deviation`.
         """
         usual = usual_size(self._scene, fault, self._settings.scene_error)
         if fault.kind == "off":
@@ -272,7 +275,7 @@ class FaultSearch:
             is_known = abs(changed.size) > max(least, self._certain * spread)
             return (changed, math.hypot(spread, drift), onset, 0.0) if is_known else None
         least, sure = self._certain * usual, self._decision.sure
-        found = likeliest(fault.size, least, sure, lambda size: self._course(fault._replace(size=size), onset))
+        found = likeliest(fault.size, least, sure, lambda size: self._course(fault._replace(size=size), onset) - healthy)
         if found is None:
             return None
         spread = math.hypot(found.spread, usual)

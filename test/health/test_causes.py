@@ -119,14 +119,14 @@ def test_seconds_must_agree_on_a_size():
     The same gain of 20 s in a single second, such as by a valve that a twin opens, counts as one.
     """
 
-    def course(gains):
+    def gain(gains):
         return lambda size: -2.0 * min(size / 0.15, 1.0) + gains * np.exp(-(((size - 0.36) / 0.08) ** 2))
 
     even, jump = np.full(20, 5.0), np.where(np.arange(20) == 9, 160.0, 0.0)
-    found = [likeliest(0.25, 0.06, math.log(19.0), course(gains)) for gains in (even, jump)]
+    found = [likeliest(0.25, 0.06, math.log(19.0), gain(gains)) for gains in (even, jump)]
     assert all(each.size == pytest.approx(0.35, abs=0.02) and each.probability > 10.0 for each in found)
     assert found[0].agreement == pytest.approx(math.sqrt(20)) and found[1].agreement < 0.0
-    assert course(even)(0.18).sum() < course(even)(0.0).sum()
+    assert gain(even)(0.18).sum() < gain(even)(0.0).sum()
 
 
 def innovations_of(values, count=None):
