@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from contextlib import nullcontext
 from functools import partial
 from math import hypot
 from pathlib import Path
@@ -16,6 +17,7 @@ from .output import open_session_scene, open_session_settings, print_result, tel
 if TYPE_CHECKING:
     from ..offline.recording import Stretch
     from ..offline.sample_table import CsvFile, ParquetFile
+    from ..plots import Painter
     from ..report.evaluation import Evaluation
 
 
@@ -45,6 +47,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     from ..offline.inputs import ReplayOptions
     from ..offline.sample_table import SampleTable, check_kind, columns_of, table_file
+    from ..plots import painter
     from ..report.evaluation import evaluated_replay
     from ..system.result_folder import REPLAY, result_folder
 
@@ -58,7 +61,8 @@ def run(args: Namespace) -> int:
         tell(f"the model starts at rest at {window.start:g} s: ignore its first seconds if the boom moved")
     tell("preparing the model (compiles for up to a minute the first time) ..")
     out, sources = Path(args.out), files_of(args, "bag", "scene", "params", "mapping")
-    with result_folder(out, REPLAY, sources) as building:
+    pictures = nullcontext() if args.no_pictures else painter()
+    with pictures as paint, result_folder(out, REPLAY, sources) as building:
         joints, name = len(scene.scene.joints), f"samples.{args.table}"
         tables: list[tuple[CsvFile | ParquetFile, SampleTable]] = []
 
@@ -79,7 +83,7 @@ def run(args: Namespace) -> int:
             causes=args.causes,
         )
         found = evaluated_replay(building, args.bag, scene, settings, options, args.fatigue, add if args.table else None)
-        files = [path.name for path in _write(args, found, building)]
+        files = [path.name for path in _write(args, found, building, paint)]
         for file, table in tables:
             table.finish()
             file.close()
@@ -99,13 +103,13 @@ def flat(summary: dict[str, Any]) -> dict[str, Any]:
     return found | {f"alarm_{key}": [alarm[key] for alarm in alarms] for key in ("channel", "kind", "from_s", "to_s", "cause")}
 
 
-def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
+def _write(args: Namespace, found: Evaluation, out: Path, paint: Painter | None) -> list[Path]:
     from ..offline.history import draw
     from ..report.quantities import FILE_NAME as QUANTITIES
 
     files = [out / QUANTITIES]
-    if not args.no_pictures:
-        files += draw(found.result, found.history, found.scene, out)
+    if paint is not None:
+        files += draw(found.result, found.history, found.scene, out, paint)
     if args.report:
         from ..report.page import write_report
 

@@ -17,7 +17,7 @@ from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..deviation.estimate_row import VARIANCES
 from ..deviation.sensor_model import specific_force
-from ..plots import AlarmSpan, EstimateTrace, History, ImuTrace, ResidualTrace, Truth, replay_pictures
+from ..plots import AlarmSpan, EstimateTrace, History, ImuTrace, Painter, ResidualTrace, Truth, replay_pictures
 from ..plots.history import extremes
 from ..plots.residuals import SessionDistributionsBuilder, running_mean
 from ..plots.results import SLOW
@@ -30,8 +30,8 @@ from .recording import Recording, ResidualRows, Stretch
 from .replay import Replay
 
 
-def draw(result: Replay, history: History, scene: Scene, out: Path) -> list[Path]:
-    """Draw the pictures of a replay, of which `history` is made, into `out`; returns their paths."""
+def draw(result: Replay, history: History, scene: Scene, out: Path, paint: Painter = replay_pictures) -> list[Path]:
+    """Let `paint` draw the pictures of a replay, of which `history` is made, into `out`; return their paths."""
     middles = tuple(UndeflectedBoom(scene, compile_scene(scene)).middles)
     _, natural = course(history, scene, POSTURES)
     natural = natural[:, np.isfinite(natural).any(axis=0)]
@@ -40,7 +40,7 @@ def draw(result: Replay, history: History, scene: Scene, out: Path) -> list[Path
     notes = result.session.notes
     note = notes.get("origin", "")
     truth = _truth(result.truth, history)
-    return replay_pictures(out, history, truth, session=result.session.path.resolve().name, note=note)
+    return paint(out, history, truth, session=result.session.path.resolve().name, note=note)
 
 
 def course(history: History, scene: Scene, most: int) -> tuple[Array, Array]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from .history import AlarmSpan, EstimateTrace, History, ImuTrace, ResidualTrace, Truth
-from .session import replay_pictures
+from .session import Painter, painter, replay_pictures
 
-__all__ = ["AlarmSpan", "EstimateTrace", "History", "ImuTrace", "ResidualTrace", "Truth", "replay_pictures"]
+__all__ = [
+    "AlarmSpan", "EstimateTrace", "History", "ImuTrace", "Painter", "ResidualTrace", "Truth", "painter", "replay_pictures",
+]  # fmt: skip

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..system.processes import beside
+from ..system.child_call import ChildCall, ChildEndedError
+from ..system.processes import beside, usable_cores
 from ..types import Array
 from .boom import draw_base
 from .history import History, Truth
@@ -67,6 +70,32 @@ def replay_pictures(
         if is_drawn[posture]:
             posture_picture(posture, session, history, note)
     return [path for path, is_there in is_drawn.items() if is_there]
+
+
+Painter = Callable[..., list[Path]]  # as `replay_pictures`
+
+
+@contextmanager
+def painter() -> Iterator[Painter]:
+    """Provide `replay_pictures`. With a second core, a child process imports matplotlib at once, and draws."""
+    if usable_cores() < 2:
+        yield replay_pictures
+        return
+
+    def draw(*given: Any, **named: Any) -> list[Path]:
+        try:
+            paths: list[Path] = child(*given, **named)
+        except ChildEndedError:
+            paths = replay_pictures(*given, **named)
+        return paths
+
+    with closing(ChildCall(_prepared, is_urgent=True)) as child:
+        yield draw
+
+
+def _prepared() -> Painter:
+    import_plotting()
+    return replay_pictures
 
 
 class Panel(NamedTuple):

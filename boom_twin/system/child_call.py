@@ -24,20 +24,21 @@ class ChildCall:
     """Callable that `make` returns for its arguments, made and called in a child process. Everything passed is pickled.
 
     A call blocks its thread only. `close` kills the child, as the end of this object does. It also ends with its standard
-    input: with this process.
+    input: with this process. It gives way to other processes unless it `is_urgent`.
     """
 
-    def __init__(self, make: Callable[..., Callable[..., Any]], *arguments: Any) -> None:
+    def __init__(self, make: Callable[..., Callable[..., Any]], *arguments: Any, is_urgent: bool = False) -> None:
         command = python_command("boom_twin.system.child_call")
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         self.close = weakref.finalize(self, _end, self._process, os.getpid())
+        self._send(0 if is_urgent else LESS_URGENT)
         self._send((make, arguments))
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
         """Return what the call gives; raise what it raises, or ChildEndedError."""
         assert self._process.stdout is not None
         try:
-            self._send(arguments)
+            self._send((arguments, named))
             error, found = pickle.load(self._process.stdout)
         except (EOFError, OSError, ValueError) as ended:  # ValueError: its pipes are closed
             raise ChildEndedError(f"a child process ended with code {self._process.wait()}") from ended
@@ -67,16 +68,16 @@ def _serve() -> None:
     """Answer the calls that arrive on standard input. What is printed goes to standard error."""
     for stop in (signal.SIGINT, signal.SIGHUP):  # sent to all processes of a terminal
         signal.signal(stop, signal.SIG_IGN)
-    os.nice(LESS_URGENT)
     calls, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
+    os.nice(pickle.load(calls))
     make, arguments = pickle.load(calls)
     call = make(*arguments)
     with suppress(EOFError, BrokenPipeError):
         while True:
-            arguments, error, found = pickle.load(calls), None, None
+            (arguments, named), error, found = pickle.load(calls), None, None
             try:
-                found = call(*arguments)
+                found = call(*arguments, **named)
             except Exception as raised:
                 error = raised
             pickle.dump((error, found), answers)

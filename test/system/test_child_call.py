@@ -33,8 +33,9 @@ def test_a_child_that_ends_is_an_error():
 
 
 def test_a_child_gives_way_to_its_parent():
-    """Beside a parent that never waits, less than a twentieth of a core is a child's."""
+    """Beside a parent that never waits, less than a twentieth of a core is a child's, unless it is urgent."""
     assert ChildCall(partial, os.nice)(0) >= min(os.nice(0) + 14, 19)
+    assert ChildCall(partial, os.nice, is_urgent=True)(0) == os.nice(0)
 
 
 def test_closing_ends_a_child_that_works():
