@@ -120,7 +120,7 @@ class Template:
     def fill(self, stamps: Integers, doubles: Array, singles: Array | None = None) -> list[Bytes]:
         """Return the bytes of each message, a row for each of the stamps.
 
-        `doubles` (k, d) are in the order of the placeholders; `singles`, of ``float32``, are the same in every row.
+        `doubles` (k, d) and `singles` (k, s), of ``float32``, are in the order of their placeholders.
         """
         rows = np.empty((len(stamps), len(self._blank)), np.uint8)
         rows[:] = self._blank

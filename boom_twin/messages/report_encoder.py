@@ -59,19 +59,20 @@ class ShapeMarkers:
         self._template: Template | None = None
         self._past: deque[tuple[int, bytes]] = deque()
 
-    def fill(self, prediction: Prediction) -> bytes:
-        """Return the encoded message of a prediction that has a shape."""
-        line, straight, pins = prediction.shape, prediction.undeflected, prediction.pins
-        assert line is not None and straight is not None and pins is not None
+    def fill(self, predictions: Sequence[Prediction]) -> Iterator[bytes]:
+        """Yield the encoded messages of predictions that have a shape; at least one."""
+        names = "stamp", "shape", "undeflected", "pins", "tip_position", "cylinder_forces"
+        stamps, line, straight, pins, tips, forces = (np.array([getattr(p, name) for p in predictions]) for name in names)
         large = straight + self._factor * (line - straight)
-        label = large[-1] + (0.0, 2.0 * TEXT_HEIGHT)
+        label = large[:, -1] + (0.0, 2.0 * TEXT_HEIGHT)
         if self._template is None:
-            self._template = self._new_template(len(line), len(pins))
-        numbers = np.concatenate([part.ravel() for part in (line, large, label, straight, pins, prediction.tip_position)])
-        colours = force_colours(prediction.cylinder_forces / self._scale)
-        self._extend_trace(prediction.stamp, prediction.tip_position)
-        (data,) = self._template.fill(np.array([prediction.stamp]), numbers, colours.ravel())
-        return self._with_trace(data.tobytes())
+            self._template = self._new_template(line.shape[1], pins.shape[1])
+        rows = (part.reshape(len(stamps), -1) for part in (line, large, label, straight, pins, tips))
+        colours = force_colours(forces / self._scale).reshape(len(stamps), -1)
+        (data,) = self._template.fill(stamps, np.concatenate(list(rows), axis=1), colours)
+        for prediction, message in zip(predictions, data, strict=True):
+            self._extend_trace(prediction.stamp, prediction.tip_position)
+            yield self._with_trace(message.tobytes())
 
     def _new_template(self, points: int, cylinders: int) -> Template:
         """Return the template of a message whose lines have `points` points and whose trace has one point."""
@@ -127,10 +128,10 @@ class ShapeMarkers:
 
 
 def force_colours(shares: Array) -> Array:
-    """Return colours (n, 4) of cylinders: grey at a share of 0, red at 1 (tension), blue at -1 (compression), pale for NaN."""
-    shares = shares[:, None]
+    """Return colours (.., 4) of cylinders: grey at a share of 0, red at 1 (tension), blue at -1 (compression), pale for NaN."""
+    shares = shares[..., None]
     colours = NO_FORCE + np.minimum(abs(shares), 1.0) * (np.where(shares > 0.0, TENSION, COMPRESSION) - NO_FORCE)
-    return np.where(np.isnan(shares), GHOST, np.hstack([colours, np.ones_like(shares)]))
+    return np.where(np.isnan(shares), GHOST, np.concatenate([colours, np.ones_like(shares)], axis=-1))
 
 
 OK, WARN, ERROR = range(3)
@@ -244,7 +245,7 @@ class ReportEncoder:
         if report.health is not None:
             messages += [each for each in self._fill_health(report.health) if is_wanted(each[0])]
         if p is not None and p.shape is not None and is_wanted(Output.SHAPE):
-            messages.append((Output.SHAPE, self._markers.fill(p)))
+            messages += [(Output.SHAPE, data) for data in self._markers.fill([p])]
         return messages
 
     def fill_block(self, block: ReportBlock) -> EncodedBlock:
@@ -269,8 +270,9 @@ class ReportEncoder:
         for row, health in block.health.items():
             for turn, (output, message) in enumerate(self._fill_health(health), start=last + 1):
                 found.add_one(output, row, turn, message)
-        for row in sorted(p.outlines):
-            found.add_one(Output.SHAPE, int(p.at[row]), last + 3, self._markers.fill(p.one(row)))
+        if shapes := sorted(p.outlines):
+            for row, message in zip(shapes, self._markers.fill([p.one(row) for row in shapes]), strict=True):
+                found.add_one(Output.SHAPE, int(p.at[row]), last + 3, message)
         return found.block(block.stamps)
 
     def _numbers(

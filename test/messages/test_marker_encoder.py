@@ -38,7 +38,7 @@ def predictions(scene: Any) -> list[Prediction]:
 
 def drawn(predictions: list[Prediction]) -> list[dict[tuple[str, int], Any]]:
     markers = ShapeMarkers(FACTOR, FULL)
-    messages = [decoded(markers.fill(prediction), Output.SHAPE) for prediction in predictions]
+    messages = [decoded(data, Output.SHAPE) for data in markers.fill(predictions)]
     return [{(marker.ns, marker.id): marker for marker in message.markers} for message in messages]
 
 
