@@ -35,6 +35,7 @@ KERNEL_SOURCES = (
     "health/sensor_survey.py", "health/sensor_findings.py", "types.py", "sensor_kinds.py",
 )  # fmt: skip
 """Folders and modules of the package that kernels, or the constants in them, come from."""
+NO_COLOURS = "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"
 SUFFIX, USER = ".kernel", ".user"
 CACHE_NAME = re.compile("[0-9a-f]{16}")
 KEPT = 30 * 86400.0  # s for which a cache is kept that no known installation uses
@@ -54,7 +55,8 @@ def source_hash(root: Path = ROOT) -> str:
 
 def _settings() -> list[tuple[str, str]]:
     """Return numba's settings in the environment, on which compiled code depends."""
-    return sorted(pair for pair in os.environ.items() if pair[0].startswith("NUMBA_") and pair[0] != "NUMBA_CACHE_DIR")
+    without = "NUMBA_CACHE_DIR", NO_COLOURS
+    return sorted(pair for pair in os.environ.items() if pair[0].startswith("NUMBA_") and pair[0] not in without)
 
 
 def cache_root() -> Path:

@@ -12,10 +12,12 @@ from typing import Any, ClassVar, NamedTuple
 
 from llvmlite.binding import create_pass_builder, create_pipeline_tuning_options
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import CompilerBase, DefaultPassBuilder  # documented for compilers of one's own
 from numba.extending import models, register_model
 from numba.types import Dispatcher, unliteral
 
+ABSENT = {"inline_closure_likes", "nopython_rewrites", "inline_inlinables", "inline_overloads"}
+"""Passes for closures, expressions of whole arrays, and functions that numba's users inline as Python code."""
 LEVEL = 1  # of optimisation; above it compiling takes longer, and steps as long
 
 
@@ -104,13 +106,13 @@ class InlinedCode(KernelCode):
         return 0
 
 
-class LeanCompiler(Compiler):
-    """numba's compiler without its passes for what kernels do not have: closures, and expressions of whole arrays."""
+class LeanCompiler(CompilerBase):
+    """numba's compiler without its passes for what kernels do not have, see `ABSENT`."""
 
     def define_pipelines(self) -> Any:
         """Return the passes."""
-        (found,) = super().define_pipelines()
-        found.passes = [each for each in found.passes if each[0].name() not in ("inline_closure_likes", "nopython_rewrites")]
+        found = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        found.passes = [each for each in found.passes if each[0].name() not in ABSENT]
         return [found]
 
 

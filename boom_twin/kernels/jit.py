@@ -9,6 +9,7 @@ counting, which was nearly half of a step.
 from __future__ import annotations
 
 import logging
+import os
 import struct
 from collections.abc import Callable, Sequence
 from functools import cache, cached_property, update_wrapper
@@ -19,7 +20,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..errors import UsageError
-from .compiled_cache import SUFFIX, KernelCache, cache_folder, claim, fault_of
+from .compiled_cache import NO_COLOURS, SUFFIX, KernelCache, cache_folder, claim, fault_of
 
 Fields = TypeVar("Fields")
 
@@ -51,6 +52,8 @@ def _numba() -> Any:
     if Path(CONFIG_FILE).exists():
         file = Path(CONFIG_FILE).absolute()
         raise UsageError(f"{file}: would change how the model is compiled. Move it away, or start elsewhere.")
+    # numba words an error for every signature that it tries; where colorama is installed, colours take a twentieth of compiling
+    os.environ.setdefault(NO_COLOURS, "1")
     import numba
 
     return numba

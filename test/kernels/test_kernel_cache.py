@@ -219,6 +219,7 @@ def test_the_hash_of_the_sources_counts_everywhere(tmp_path: Path, monkeypatch: 
     (tmp_path / "types.py").write_text("NANO = 1e-9\n")
     assert source_hash(tmp_path) != edited
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv(kernel_cache.NO_COLOURS, "1")  # of messages: the code is the same
     assert cache_folder() == tmp_path / before
     monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
     assert cache_folder() != tmp_path / before
