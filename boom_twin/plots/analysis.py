@@ -13,8 +13,7 @@ from ..analysis.steady_state import ResonanceMap, SteadyState
 from ..scene.kinematics import skeleton
 from ..scene.schema import Scene
 from ..types import Array, ComplexArray
-from .boom import draw_base
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, TONES, legend_above, picture, side_view
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, TONES, draw_base, legend_above, picture, side_view
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

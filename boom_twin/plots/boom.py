@@ -3,38 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..scene.kinematics import Skeleton, skeleton, stroke_curve
 from ..scene.schema import Scene
 from ..types import Array
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, picture
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, draw_pin, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
 STEEL, RIGID, BARREL, ROD = "#C9D6E2", "#8FA3B5", "#E6B98A", "#B9742F"
-
-
-def draw_base(axes: Axes, pivot: Array, size: float) -> None:
-    """Draw a triangle under a pivot (m) on hatched ground; `size` is its height (m)."""
-    x, y = pivot
-    ground, half = y - size, 0.6 * size
-    axes.fill([x - half, x, x + half], [ground, y, ground], facecolor="white", edgecolor=INK, zorder=1.5)
-    axes.plot([x - size, x + size], [ground, ground], color=INK, zorder=1.5)
-    for k in np.linspace(-0.85, 1.0, 7):
-        dash = [x + k * size, x + (k - 0.25) * size]
-        axes.plot(dash, [ground, ground - 0.25 * size], color=INK, linewidth=0.9, zorder=1.5)
-    draw_pin(axes, pivot)
-
-
-def draw_pin(axes: Axes, place: Array, size: float = 6.0, colour: str = INK) -> None:
-    """Draw a pin as a small circle, `size` in points."""
-    look: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": colour, "markeredgewidth": 1.5}
-    axes.plot(place[0], place[1], "o", markersize=size, zorder=8, **look)
 
 
 def draw_link(axes: Axes, points: list[Array], colour: str = BLUE, width: float = 5.0) -> None:

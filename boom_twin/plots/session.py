@@ -12,7 +12,6 @@ import numpy as np
 from ..system.child_call import ChildCall, ChildEndedError
 from ..system.processes import beside, usable_cores
 from ..types import Array
-from .boom import draw_base
 from .history import History, Truth
 from .residuals import has_spectrum, residual_picture, spectrum_picture
 from .style import (
@@ -25,6 +24,7 @@ from .style import (
     TIME,
     broken,
     colours_of_times,
+    draw_base,
     extent,
     import_plotting,
     legend_above,

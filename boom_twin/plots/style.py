@@ -1,4 +1,4 @@
-"""Common style of all pictures: canvas, colours, titles, PNG files. No display is needed."""
+"""Common style of all pictures: canvas, colours, titles, base and pins, PNG files. No display is needed."""
 
 from __future__ import annotations
 
@@ -144,6 +144,24 @@ def side_view(axes: Axes) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x forward, m")
     axes.set_ylabel("y up, m")
+
+
+def draw_base(axes: Axes, pivot: Array, size: float) -> None:
+    """Draw a triangle under a pivot (m) on hatched ground; `size` is its height (m)."""
+    x, y = pivot
+    ground, half = y - size, 0.6 * size
+    axes.fill([x - half, x, x + half], [ground, y, ground], facecolor="white", edgecolor=INK, zorder=1.5)
+    axes.plot([x - size, x + size], [ground, ground], color=INK, zorder=1.5)
+    for k in np.linspace(-0.85, 1.0, 7):
+        dash = [x + k * size, x + (k - 0.25) * size]
+        axes.plot(dash, [ground, ground - 0.25 * size], color=INK, linewidth=0.9, zorder=1.5)
+    draw_pin(axes, pivot)
+
+
+def draw_pin(axes: Axes, place: Array, size: float = 6.0, colour: str = INK) -> None:
+    """Draw a pin as a small circle, `size` in points."""
+    look: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": colour, "markeredgewidth": 1.5}
+    axes.plot(place[0], place[1], "o", markersize=size, zorder=8, **look)
 
 
 def colours_of_times(figure: Figure, axes: Any, times: Array, label: str) -> Callable[[Any], Any]:
