@@ -1,31 +1,22 @@
-"""What programs get of a monitor: figures at /metrics, and alarms by a webhook."""
+"""What programs get of a monitor: figures at /metrics."""
 
 from __future__ import annotations
 
-import asyncio
 import json
-import socket
-from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from aiohttp import ClientSession, web
-from aiohttp.test_utils import TestServer
+from aiohttp import ClientSession
 from monitor.test_monitor_lamps import ERROR
 from monitor.test_monitor_server import Made, serve
 
 from boom_twin.monitor.access_control import AccessControl
 from boom_twin.monitor.data.feed import Feed
-from boom_twin.monitor.fleet import Webhook
-from boom_twin.monitor.server import Server
-from boom_twin.monitor.viewer import ViewerActions
-from boom_twin.texts import alarm_text
 from boom_twin.types import Alarm
 
 SECOND = 10**9
-PATIENCE = 240.0
 
 
 def scraped(feed: Feed) -> dict[str, dict[tuple[tuple[str, str], ...], float]]:
@@ -91,7 +82,7 @@ def test_a_silent_feed_gives_no_old_figures(monkeypatch: pytest.MonkeyPatch) -> 
     found = scraped(live)
     assert found["boom_twin_tip_displacement_meters"][label("front", source="predicted", axis="z")] == pytest.approx(-0.2)
     assert found["boom_twin_component_level"][label("front", component="sensor joint_1")] == ERROR
-    monkeypatch.setattr("boom_twin.monitor.fleet.SILENCE", -1.0)
+    monkeypatch.setattr("boom_twin.monitor.metrics.SILENCE", -1.0)
     found = scraped(live)
     assert (
         "boom_twin_tip_displacement_meters" not in found and found["boom_twin_newest_sample_age_seconds"][label("front")] >= 0.0
@@ -118,106 +109,3 @@ def test_access_to_metrics_is_that_to_the_page() -> None:
         assert (await session.get(f"{url}metrics", headers={"Host": "evil.example"})).status == 403
 
     serve(Live(), as_another_host)
-
-
-class Receiver:
-    """HTTP server that takes what a webhook posts; it answers with `statuses` first, then with 204."""
-
-    def __init__(self, *statuses: int) -> None:
-        self.taken: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
-        self._statuses = list(statuses)
-
-    async def take(self, request: web.Request) -> web.Response:
-        found = await request.json()
-        status = self._statuses.pop(0) if self._statuses else 204
-        if status == 204:
-            self.taken.put_nowait(found)
-        return web.Response(status=status, headers={"Location": "/elsewhere"})
-
-
-def posting(feed: Feed, receiver: Receiver, story: Callable[[TestServer], Awaitable[None]]) -> None:
-    """Run a story while a server of the feed posts to the receiver."""
-
-    async def run() -> None:
-        application = web.Application()
-        application.router.add_post("/secret", receiver.take)
-        async with TestServer(application) as target:
-            webhook = Webhook(str(target.make_url("/secret")))
-            server = Server(feed, ViewerActions(feed, frozenset()), AccessControl("127.0.0.1"), webhook=webhook)
-            async with TestServer(server.application()) as served:
-                await asyncio.wait_for(story(served), PATIENCE)
-
-    asyncio.run(run())
-
-
-@pytest.fixture
-def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("boom_twin.monitor.fleet.PAUSES", (0.0,) * 3)
-    monkeypatch.setattr("boom_twin.monitor.server.ALARM_PERIOD", 0.0)
-
-
-@pytest.mark.usefixtures("at_once")
-def test_an_alarm_is_posted_when_it_begins_changes_its_cause_and_ends() -> None:
-    live, receiver = Live(), Receiver(503, 429)
-
-    async def story(_: TestServer) -> None:
-        live.judge()
-        begun = await receiver.taken.get()
-        text = alarm_text("joint_2", "deviation", None)
-        assert begun == {
-            "host": socket.gethostname(), "event": "begin", "boom": "front", "source": "made", "channel": "joint_2",
-            "kind": "deviation", "cause": None, "text": text, "evidence": "5 times the expected noise", "stop": False,
-            "from": "2001-09-09T01:46:42.000000Z", "to": None,
-        }  # fmt: skip
-        live.judge()
-        live.judge(cause="cylinder_2.k")
-        changed = await receiver.taken.get()
-        assert (changed["event"], changed["cause"]) == ("cause", "cylinder_2.k")
-        live.judge(until=10**18 + 9_500_000_000)
-        ended = await receiver.taken.get()
-        assert (ended["event"], ended["to"]) == ("end", "2001-09-09T01:46:49.500000Z") and receiver.taken.empty()
-
-    posting(live, receiver, story)
-
-
-@pytest.mark.usefixtures("at_once")
-@pytest.mark.parametrize(("statuses", "told"), [((503,) * 4, "503; 4 attempts"), ((404, 404, 404, 302), "302; 4 attempts")])
-def test_it_gives_up_with_a_line_in_the_log(statuses: tuple[int, ...], told: str, caplog: pytest.LogCaptureFixture) -> None:
-    live, receiver = Live(), Receiver(*statuses)
-
-    async def story(_: TestServer) -> None:
-        live.judge()
-        while not caplog.messages:
-            await asyncio.sleep(0)
-        live.judge(cause="cylinder_2.k")
-        assert (await receiver.taken.get())["event"] == "cause", "the next one is posted all the same"
-
-    posting(live, receiver, story)
-    (line,) = caplog.messages
-    assert "gave up the message begin of alarm joint_2 (deviation)" in line and told in line and "secret" not in line
-
-
-@pytest.mark.usefixtures("at_once")
-def test_a_receiver_that_never_answers_does_not_delay_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("boom_twin.monitor.fleet.CLOSING_TIME", 0.0)
-    live = Live()
-
-    class Silent(Receiver):
-        def __init__(self) -> None:
-            super().__init__()
-            self.asked = asyncio.Event()
-
-        async def take(self, request: web.Request) -> web.Response:
-            self.asked.set()
-            await asyncio.Event().wait()
-            raise AssertionError
-
-    receiver = Silent()
-
-    async def story(served: TestServer) -> None:
-        live.judge()
-        await receiver.asked.wait()
-        async with ClientSession() as session:
-            assert (await session.get(served.make_url("/"))).status == 200
-
-    posting(live, receiver, story)
