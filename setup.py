@@ -70,7 +70,6 @@ setup(
             "nbclient>=0.10,<1",
             "nbformat>=5.10,<6",
             "ipykernel>=6.29,<8",
-            "argcomplete>=3.4,<4",
         ],
         "peers": ["exudyn>=1.13,<2", "pyOMA-2>=1.4,<2"],
         "modal": ["pyOMA-2>=1.4,<2"],
@@ -83,7 +82,6 @@ setup(
         "import": ["npTDMS>=1.13,<2", "asammdf>=8.8,<9", "pyarrow>=18,<27", "tzdata>=2025.1"],
         "fatigue": ["rainflow>=3.2,<4"],
         "notebook": ["pandas>=2.2,<4", "nbclient>=0.10,<1", "nbformat>=5.10,<6", "ipykernel>=6.29,<8"],
-        "completion": ["argcomplete>=3.4,<4"],
         "docs": [
             "mkdocs>=1.6.1,<2",
             "mkdocs-material>=9.8.1,<10",
