@@ -63,7 +63,6 @@ setup(
             "mypy>=1.11,<3",
             "import-linter>=2.0,<3",
             "aiohttp>=3.14.4,<4",
-            "prometheus_client>=0.21,<1",
             "playwright>=1.56,<2",
             "rainflow>=3.2,<4",
             "pandas>=2.2,<4",
@@ -73,7 +72,7 @@ setup(
         ],
         "peers": ["exudyn>=1.13,<2", "pyOMA-2>=1.4,<2"],
         "modal": ["pyOMA-2>=1.4,<2"],
-        "monitor": ["aiohttp>=3.14.4,<4", "prometheus_client>=0.21,<1"],
+        "monitor": ["aiohttp>=3.14.4,<4"],
         "batch": [
             "dask>=2025.5,<2027",
             "distributed>=2025.5,<2027",

@@ -16,7 +16,6 @@ from . import PORT
 from .access_control import POLICY, AccessControl, Connection, in_address
 from .data.analyst import Analyst
 from .data.feed import Feed
-from .metrics import Metrics
 from .viewer import Viewer, ViewerActions
 
 PAGE = Path(__file__).parent / "page"
@@ -31,12 +30,11 @@ class Server:
 
     def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl) -> None:
         self._feed, self._actions, self._access = feed, actions, access
-        self._metrics = Metrics(feed)
         self._viewers: set[web.WebSocketResponse] = set()
 
     def application(self) -> web.Application:
         application = web.Application(middlewares=[self._guard], client_max_size=MAX_REQUEST_BYTES)
-        routes = {"/": self._index, "/socket": self._connect, "/page/{name}": self._file, "/metrics": self._answer_metrics}
+        routes = {"/": self._index, "/socket": self._connect, "/page/{name}": self._file}
         application.add_routes([web.get(path, handler) for path, handler in routes.items()])
         application.on_response_prepare.append(_add_policy)
         application.cleanup_ctx.append(self._run)
@@ -57,10 +55,6 @@ class Server:
         if file is None:
             raise web.HTTPNotFound(text="there is no such file of the page")
         return web.FileResponse(file)
-
-    async def _answer_metrics(self, request: web.Request) -> web.Response:
-        body, kind = self._metrics.text()
-        return web.Response(body=body, headers={"Content-Type": kind})
 
     async def _connect(self, request: web.Request) -> web.StreamResponse:
         heartbeat = 60.0  # seconds without an answer after which the connection is closed
@@ -88,7 +82,6 @@ class Server:
         poll_period = 1.0 / 60.0  # seconds between two polls of the feed
         while True:
             self._feed.poll()
-            self._metrics.follow()
             await asyncio.sleep(poll_period)
 
     async def _close_viewers(self, application: web.Application) -> None:
