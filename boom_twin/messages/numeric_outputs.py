@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..deviation.estimate_row import FORCE_VARIANCE, MODES
-from ..kernels.jit import SameTypes, inner, kernel
+from ..kernels.jit import SameTypes
+from ..kernels.tip_joints import write_derived
 from ..predictions import Estimate, Prediction
 from ..twin.blocks import EstimateBlock, Integers, PredictionBlock, row_of
 from ..types import Array
@@ -122,30 +123,6 @@ class Chain(NamedTuple):
 
     pivot: Array
     lengths: Array
-
-
-@kernel
-def write_derived(pivot: Array, lengths: Array, numbers: Array, first: int, at: int) -> None:
-    """Write the joints of the tip (m, m, rad) and sine and cosine of half the angle of the estimate into rows of numbers.
-
-    Joints begin at column `first`, those of the tip at column `at`, and the estimate behind them.
-    """
-    for row in numbers:
-        angle, x, y = 0.0, 0.0, 0.0
-        along = across = math.nan
-        for i in range(lengths.shape[0]):
-            angle += row[first + i]
-            along, across = turn(angle)
-            x, y = x + lengths[i] * along, y + lengths[i] * across
-        dx, dy = row[0] - (pivot[0] + x), row[1] - (pivot[1] + y)
-        row[at], row[at + 1], row[at + 2] = along * dx + across * dy, along * dy - across * dx, row[2] - angle
-        row[-1], row[-2] = turn(0.5 * row[at + 5])
-
-
-@inner
-def turn(angle: float) -> tuple[float, float]:
-    """Return cosine and sine of an angle (rad); NaN of infinity."""
-    return (math.cos(angle), math.sin(angle)) if math.isfinite(angle) else (math.nan, math.nan)
 
 
 _DERIVE = SameTypes(write_derived)
