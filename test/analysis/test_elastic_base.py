@@ -61,7 +61,7 @@ def test_balances_close_with_worn_pins_on_the_base():
     move, times = motion_of(scene), np.linspace(0.0, 0.5, 101)
     course = course_of(scene, times, move(times)[0], angles=move.angles)
     energy, momentum = energy_balance(course, 1e-3), momentum_balance(course, 1e-3)
-    assert energy.contact > 5.0 and energy.damping > 0.5 and energy.share < 1e-6
+    assert energy.contact > 1e-3 and energy.damping > 0.5 and energy.share < 1e-6
     assert momentum.linear_share < 1e-7 and momentum.angular_share < 2e-5
 
 
