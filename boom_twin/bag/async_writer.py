@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import inf
 from queue import Empty, SimpleQueue
 from shutil import disk_usage
@@ -77,22 +76,6 @@ MOST_WAITING = 256 * 2**20  # bytes of messages that may wait in memory
 _Message = tuple[int, int, bytes, int, int]
 
 
-@dataclass(frozen=True, slots=True)
-class FileSplit:
-    """Limits of one file: `size` in bytes and `duration` in seconds of log time; None is no limit."""
-
-    size: int | None = None
-    duration: float | None = None
-
-    def is_due(self, bag: BagWriter, log_time: int) -> bool:
-        """Return True if a message with this log time (ns) belongs into the next file."""
-        if bag.first is None:
-            return False
-        if self.size is not None and bag.size >= self.size:
-            return True
-        return self.duration is not None and log_time - bag.first >= self.duration * 1e9
-
-
 class Storage:
     """Queue of messages in front of a bag; a thread writes them, so that a slow disk does not block the caller.
 
@@ -100,8 +83,8 @@ class Storage:
     receives a sentence when the disk does not answer, and when it answers again. Only this object may use `bag` from now on.
     """
 
-    def __init__(self, bag: BagWriter, split: FileSplit, tell: Callable[[str], None]) -> None:
-        self._bag, self._split, self._tell = bag, split, tell
+    def __init__(self, bag: BagWriter, tell: Callable[[str], None]) -> None:
+        self._bag, self._tell = bag, tell
         self._queue: SimpleQueue[_Message | Recorded | None] = SimpleQueue()
         self._put = self._taken = 0  # bytes; each is changed by one thread only
         self._began = self._alive = time.monotonic()
@@ -219,7 +202,5 @@ class Storage:
 
     def _write(self, message: _Message) -> None:
         key, log_time, data, publish_time, sequence = message
-        if self._split.is_due(self._bag, log_time):
-            self._bag.split()
         self._bag.write(key, log_time, data, publish_time, sequence)
         self._taken += len(data)

@@ -184,4 +184,4 @@ def _count(file: SessionFile, tallies: dict[str, Tally], bounds: tuple[int, int]
                 own[key].add(log_time, data)
     for key in passed_over:
         own[key].count += seen[key]
-    file.check_counts("statistics", file.counts, "read", seen)
+    file.check_counts(file.counts, seen)

@@ -187,10 +187,9 @@ class SessionFile(ABC):
     checked: bool = False  # True if its messages are under a checksum and counted. If not, a flipped bit can pass undetected
     notes: dict[str, str] = field(default_factory=dict)
 
-    def check_counts(self, source: str, counts: Mapping[int, int], other: str, others: Mapping[int, int]) -> None:
-        """Raise BagError, as `compare_counts`, if two counts by channel are not the same for every topic."""
-        one, two = by_topic(counts, self.channels), by_topic(others, self.channels)
-        compare_counts(self.path, source, one, other, two)
+    def check_counts(self, told: Mapping[int, int], seen: Mapping[int, int]) -> None:
+        """Raise BagError if the statistics and the messages read, by channel, are not the same for every topic."""
+        compare_counts(self.path, "statistics", by_topic(told, self.channels), "read", by_topic(seen, self.channels))
 
     def type_of(self, channel: Channel) -> str:
         """Return the type of a channel as ``package/msg/Name``; "" without a schema.
@@ -327,7 +326,7 @@ def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahea
             times = block.log_times + np.uint64(ahead)
             yield Part(bound + ahead, number, replace(block, sources=sources, log_times=times))
         told = {channel: count for channel, count in file.counts.items() if channel not in passed}
-        file.check_counts("statistics", told, "read", seen)
+        file.check_counts(told, seen)
 
 
 def _in_order(paths: Sequence[Path], files: Sequence[Iterator[Part]]) -> Iterator[MessageBlock]:

@@ -22,7 +22,7 @@ from ..messages.type_store import fill_header, jazzy, new_message
 from ..scene.load import SceneSource
 from ..twin.sample_check import SampleCheck, samples_of
 from ..types import SECOND, SENSORS, Array, Sample, Stream
-from .async_writer import FileSplit, Storage
+from .async_writer import Storage
 from .session_model import SessionMetadata, scene_from
 from .writer import BagWriter, MessageWriter, recorded
 
@@ -166,7 +166,7 @@ class SessionWriter:
         )
         self._bag = BagWriter(self._out, {"origin": origin} if origin else None)
         self._metadata.write(self._out)
-        self._storage = Storage(self._bag, FileSplit(), lambda _: None)
+        self._storage = Storage(self._bag, lambda _: None)
         self._keys: dict[str, int] = {}
         self._sensors = {stream: _Sensors(self._topics, stream, self._joints) for stream in Stream}
         self._counts: Counter[str] = Counter()

@@ -1,4 +1,3 @@
-# PYTHON_ARGCOMPLETE_OK
 """The console script: picks the command, and turns errors of the input into one message and an exit code.
 
 A command imports what it needs when it runs, so that help and usage errors are told at once.
@@ -103,7 +102,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
 
 DESCRIPTION = "Digital twin of a concrete placing boom."
 EXIT_CODES = "exit codes: 0 done, 1 the input or the run failed (the reason is on stderr), 2 usage"
-COMPLETING = "_ARGCOMPLETE"  # set in the environment by a shell that asks for completions
 
 
 class CommandParser(ArgumentParser):
@@ -196,25 +194,14 @@ def _parser(arguments: Sequence[str]) -> ArgumentParser:
     parser = CommandParser(prog="boom_twin", description=DESCRIPTION, epilog=ends)
     parser.add_argument("--version", action="version", version=f"boom_twin {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, help="see below")
-    is_completing = COMPLETING in os.environ
     for name, purpose in COMMANDS.items():
         about = purpose[0].upper() + purpose[1:] + "."
         examples = [f"  boom_twin {example}" for example in EXAMPLES.get(name, ())]
         own = commands.add_parser(name, description=about, epilog="\n".join(["examples:", *examples] if examples else []))
         own.add_argument("--quiet", action="store_true", help="print results, warnings and errors only")
-        if is_completing or name in arguments:
+        if name in arguments:
             _command(name).add_arguments(own)
-    if is_completing:
-        _complete(parser)
     return parser
-
-
-def _complete(parser: ArgumentParser) -> None:
-    try:
-        from argcomplete import autocomplete
-    except ImportError:
-        sys.exit(1)
-    autocomplete(parser)
 
 
 if __name__ == "__main__":

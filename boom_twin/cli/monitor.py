@@ -29,8 +29,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--host", default="127.0.0.1", help="listen here (default 127.0.0.1); elsewhere viewers need a token")
     token = "file that holds the token, asked for on this machine too (default: a new token at each start)"
     parser.add_argument("--token-file", metavar="FILE", type=Path, help=token)
-    webhook = "post a JSON object to URL when an alarm begins, changes its cause, or ends"
-    parser.add_argument("--webhook", metavar="URL", help=webhook)
     allow = "actions that viewers may take: mark, acknowledge (default: both; without names: none)"
     parser.add_argument("--allow", nargs="*", choices=ACTS, default=ACTS, metavar="ACT", help=allow)
     parser.add_argument("--until-stdin-ends", action="store_true", help=SUPPRESS)  # it ends with the node that started it
@@ -92,19 +90,17 @@ async def _serve(args: Namespace, feed: Feed) -> None:
     import asyncio
 
     from ..monitor.access_control import AccessControl, token_of
-    from ..monitor.fleet import Webhook
     from ..monitor.server import Server, serving
     from ..monitor.viewer import ViewerActions
     from ..ros.startup import stop_signals
 
     access = AccessControl(args.host, "" if args.token_file is None else token_of(args.token_file))
-    webhook = None if args.webhook is None else Webhook(args.webhook)
     loop, stopped = asyncio.get_running_loop(), asyncio.Event()
     for number in stop_signals():
         loop.add_signal_handler(number, stopped.set)
     if args.until_stdin_ends:
         loop.add_reader(sys.stdin, stopped.set)
-    server = Server(feed, ViewerActions(feed, args.allow), access, webhook)
+    server = Server(feed, ViewerActions(feed, args.allow), access)
     try:
         async with serving(server, access, args.host, args.port) as address:
             tell(f"open {address}   (Ctrl-C ends it)", is_kept=True)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 import time
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
@@ -27,16 +26,11 @@ if TYPE_CHECKING:
     from ..ros.bag.subscriptions import RequestedTopic
 
 
-_UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
-
-
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder of the session, new or empty")
     purpose = "record these topics instead; without TYPE, that of the first publisher"
     parser.add_argument("--topics", nargs="+", metavar="NAME[:TYPE]", help=purpose)
     parser.add_argument("--duration", type=positive, metavar="S", help="stop after S seconds (default: at Ctrl-C)")
-    parser.add_argument("--split-size", type=size, metavar="BYTES", help="begin a new file at this size: 500M, 2G")
-    parser.add_argument("--split-duration", type=long_enough, metavar="S", help="new file after S seconds")
     kept = "scene of the rig, kept in session.yaml (that of the running twin, if it is there)"
     parser.add_argument("--scene", metavar="SCENE", type=Path, help=kept)
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file to copy (default: the package's)")
@@ -50,7 +44,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Record until Ctrl-C, SIGTERM or the end of the duration, and print on stderr what was received."""
     require_rclpy()
-    from ..bag.async_writer import FileSplit, Storage
+    from ..bag.async_writer import Storage
     from ..bag.session_model import incompleteness
     from ..bag.writer import BagWriter
     from ..ros.bag.recorder import Recorder, recorder_node
@@ -83,7 +77,7 @@ def run(args: Namespace) -> int:
             except BagError as error:
                 warn(f"what the running twin told is not kept: {error}")
 
-        storage = Storage(bag, FileSplit(args.split_size, args.split_duration), tell)
+        storage = Storage(bag, tell)
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
         recorder = Recorder(node, storage, wanted, thresholds, tell)
         counts = recorder.run(lambda: bool(signals) or time.monotonic() >= end, on_twin)
@@ -148,23 +142,3 @@ def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:
     if args.topics:
         return requested_topics(args.topics, inputs | outputs)
     return [RequestedTopic(name, topic.type, topic) for name, topic in (inputs | outputs).items()]
-
-
-def long_enough(text: str) -> float:
-    shortest_file = 0.1  # s
-    value = positive(text)
-    if value < shortest_file:
-        raise ArgumentTypeError(f"{text}: must be at least {shortest_file:g} s: completing a file takes a while")
-    return value
-
-
-def size(text: str) -> int:
-    """Parse a number of bytes, with k, M or G for powers of 1024."""
-    smallest_file = 2**20  # bytes
-    match = re.fullmatch(r"(\d+(?:\.\d+)?)([kMG]?)B?", text)
-    if match is None:
-        raise ArgumentTypeError(f"{text!r} is not a size like 500M or 2G")
-    value = int(float(match[1]) * _UNITS[match[2]])
-    if value < smallest_file:
-        raise ArgumentTypeError(f"{text}: must be at least 1M: every file repeats the definitions")
-    return value

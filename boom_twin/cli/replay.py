@@ -27,8 +27,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     place = "folder for summary.json, bag/, tables and pictures: new, empty, or of an earlier replay, which is replaced"
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
     add_namespace(parser, "ROS namespace of the node in the session, for topics and --params")
-    purpose = "do not repeat recorded changes of load, limits, zeros, nor restarts"
-    parser.add_argument("--no-changes", action="store_true", help=purpose)
     purpose = "name the causes of alarms, by fault twins; takes about five times as long"
     parser.add_argument("--causes", action="store_true", help=purpose)
     parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
@@ -75,7 +73,6 @@ def run(args: Namespace) -> int:
         options = ReplayOptions(
             progress=partial(ProgressLine, unit="messages", name="replay"),
             mapping=args.mapping,
-            changes=not args.no_changes,
             health=not args.no_health,
             window=window,
             namespace=args.namespace,

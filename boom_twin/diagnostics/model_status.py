@@ -1,4 +1,4 @@
-"""Statuses of the model: run time, normalised residuals, health alarms, tip load, stresses."""
+"""Statuses of the model: run time, normalised residuals, health alarms, tip load."""
 
 from __future__ import annotations
 
@@ -9,14 +9,11 @@ from math import nan, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.bending_stress import BendingStressModel, stations
 from ..analysis.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms, repeated, values_of
 from ..health.deviations import KIND as DEVIATION
 from ..health.sensor_monitor import noise_as_text
-from ..predictions import Estimate, Prediction
-from ..scene.schema import Scene
-from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
+from ..types import SECOND, Alarm, Array, Health, Report
 from .levels import Bounds, ComponentJudge, Level, Status, Value
 
 FAILURE_SHOWN = 1.0  # time (s) for which a failure is shown
@@ -294,26 +291,3 @@ class HealthWatch:
 
 def _level_of(alarm: Alarm) -> Level:
     return Level.WARN if alarm.until is not None or alarm.cause is None else Level.ERROR
-
-
-def stress_model(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> BendingStressModel | None:
-    """Return the model for `stress_status`, None if no section bends. `reads` is the type of strokes."""
-    return BendingStressModel(scene, reads=reads) if stations(scene) else None
-
-
-def stress_status(
-    judge: ComponentJudge, model: BendingStressModel, prediction: Prediction, estimate: Estimate | None
-) -> Status:
-    """Return the status with moment, stress and its standard deviation at every station.
-
-    It is never a fault, because no limit is known.
-    """
-    found = model.at(prediction, estimate)
-    columns = found.moments, found.stresses, found.stress_sigmas
-    for station, moment, stress, sigma in zip(model.stations, *columns, strict=True):
-        name = f"{station.key}_m"
-        megapascals = {f"{name}_MPa": float(stress) / 1e6, f"{name}_sigma_MPa": float(sigma) / 1e6}
-        judge.note({f"{name}_Nm": float(moment)} | megapascals)
-    most = int(abs(found.stresses).argmax())
-    judge.note({"largest_MPa": float(found.stresses[most]) / 1e6, "largest_at": model.stations[most].name})
-    return judge.finish("bending stress of all stations")

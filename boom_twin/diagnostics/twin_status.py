@@ -7,11 +7,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Thresholds
 from ..types import SENSORS, Array, Health, Report, Sample, Stream
 from .levels import ComponentJudge, Evaluation, Level, Status, Value
-from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, SwingWatch, stress_status
+from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, SwingWatch
 from .sensor_status import SensorSpec, StreamWatch, sensor_status
 from .topic_status import Peers, Reception, ReceptionWatch, outputs_status, publishers_status, seconds, topic_status
 
@@ -29,9 +28,8 @@ class TwinWatch:
         names: Mapping[Stream, str],
         thresholds: Thresholds,
         monotonic: Callable[[], float] = time.monotonic,
-        stress: BendingStressModel | None = None,
     ) -> None:
-        self._monotonic, self._stress, self.thresholds = monotonic, stress, thresholds
+        self._monotonic, self.thresholds = monotonic, thresholds
         self._sensors, self._names, self._reception = sensors, names, ReceptionWatch()
         self._drive = next(iter(sensors), Stream.STROKES)
         ranges = {stream: np.array([(sensor.low, sensor.high) for sensor in each]) for stream, each in sensors.items()}
@@ -150,9 +148,6 @@ class TwinWatch:
             found.append(load)
         if self._newest is not None:
             found.append(self._swing.status(judge("swing")))
-        if self._stress is not None and self._newest is not None and self._newest.prediction is not None:
-            bending = judge("bending")
-            found.append(stress_status(bending, self._stress, self._newest.prediction, self._newest.estimate))
         for names, rows in self._rows.items():
             for name, column in zip(names, np.array(rows, float).reshape(-1, len(names)).T, strict=True):
                 window = self._residuals.setdefault(name, ResidualWindow(self._looked))

@@ -66,8 +66,8 @@ class AccessControl:
 
     Without a `token` on loopback, ``Host`` must be `host` or a usual name of this machine. So a page of another name that
     resolves to this machine is refused. Elsewhere, a missing `token` is generated at each start. If there is a token, browsers
-    send it once in the address (``/?token=..``), then in a cookie. Programs send it with every request (``Authorization:
-    Bearer ..``). A WebSocket must come from a page of this server (``Origin``).
+    send it once in the address (``/?token=..``), then in a cookie. A WebSocket must come from a page of this server
+    (``Origin``).
     """
 
     def __init__(self, host: str, token: str = "") -> None:
@@ -87,8 +87,7 @@ class AccessControl:
             raise web.HTTPForbidden(text="only a page of this monitor may connect")
 
     def _check_token(self, request: web.Request) -> None:
-        kind, _, sent = request.headers.get("Authorization", "").partition(" ")
-        if self._fits(request.cookies.get(COOKIE, "")) or (kind.lower() == "bearer" and self._fits(sent.strip())):
+        if self._fits(request.cookies.get(COOKIE, "")):
             return
         if not self._fits(request.query.get("token", "")):
             raise web.HTTPForbidden(text="open the address that the monitor printed; it holds the token")

@@ -14,7 +14,7 @@ offset  type                   meaning
 ======  =====================  ========================================================================================
 
 A spectrum has two columns: the directions named by the message ``lines`` before it. Text messages are JSON with a key ``kind``:
-``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``rates``, ``answer``.
+``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``answer``.
 """
 
 from __future__ import annotations

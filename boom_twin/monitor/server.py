@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from contextlib import asynccontextmanager, suppress
 from errno import EADDRINUSE
 from functools import partial
 from pathlib import Path
@@ -16,29 +16,25 @@ from . import PORT
 from .access_control import POLICY, AccessControl, Connection, in_address
 from .data.analyst import Analyst
 from .data.feed import Feed
-from .fleet import AlarmWatch, Metrics, Webhook
 from .viewer import Viewer, ViewerActions
 
 PAGE = Path(__file__).parent / "page"
 MAX_VIEWERS = 16
 MAX_REQUEST_BYTES = 4096  # largest request of a page, bytes
-ALARM_PERIOD = 1.0  # seconds between two looks for changes of alarms
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Server of the live page for one feed. `webhook` posts changes of alarms."""
+    """Server of the live page for one feed."""
 
-    def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl, webhook: Webhook | None = None) -> None:
-        self._feed, self._actions, self._access, self._webhook = feed, actions, access, webhook
-        self._watch = AlarmWatch(feed)
-        self._metrics = Metrics(feed, self._watch)
+    def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl) -> None:
+        self._feed, self._actions, self._access = feed, actions, access
         self._viewers: set[web.WebSocketResponse] = set()
 
     def application(self) -> web.Application:
         application = web.Application(middlewares=[self._guard], client_max_size=MAX_REQUEST_BYTES)
-        routes = {"/": self._index, "/socket": self._connect, "/page/{name}": self._file, "/metrics": self._answer_metrics}
+        routes = {"/": self._index, "/socket": self._connect, "/page/{name}": self._file}
         application.add_routes([web.get(path, handler) for path, handler in routes.items()])
         application.on_response_prepare.append(_add_policy)
         application.cleanup_ctx.append(self._run)
@@ -60,10 +56,6 @@ class Server:
             raise web.HTTPNotFound(text="there is no such file of the page")
         return web.FileResponse(file)
 
-    async def _answer_metrics(self, request: web.Request) -> web.Response:
-        body, kind = self._metrics.text()
-        return web.Response(body=body, headers={"Content-Type": kind})
-
     async def _connect(self, request: web.Request) -> web.StreamResponse:
         heartbeat = 60.0  # seconds without an answer after which the connection is closed
         if len(self._viewers) >= MAX_VIEWERS:
@@ -79,30 +71,18 @@ class Server:
 
     async def _run(self, application: web.Application) -> AsyncIterator[None]:
         self._analyst = Analyst(self._feed)
-        async with AsyncExitStack() as stack:
-            if self._webhook is not None:
-                await stack.enter_async_context(self._webhook.posting())
-            tasks = [asyncio.create_task(each()) for each in (self._poll, self._follow_alarms)]
-            tasks[0].add_done_callback(_stop_on_fault)
-            yield
-            for task in tasks:
-                task.cancel()
-                with suppress(asyncio.CancelledError):
-                    await task
+        task = asyncio.create_task(self._poll())
+        task.add_done_callback(_stop_on_fault)
+        yield
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
 
     async def _poll(self) -> None:
         poll_period = 1.0 / 60.0  # seconds between two polls of the feed
         while True:
             self._feed.poll()
             await asyncio.sleep(poll_period)
-
-    async def _follow_alarms(self) -> None:
-        while True:
-            self._metrics.follow()
-            for change in self._watch.changes():
-                if self._webhook is not None:
-                    self._webhook.put(change)
-            await asyncio.sleep(ALARM_PERIOD)
 
     async def _close_viewers(self, application: web.Application) -> None:
         for socket in set(self._viewers):

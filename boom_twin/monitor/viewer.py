@@ -77,7 +77,7 @@ class Viewer:
 
     async def serve(self) -> None:
         """Send and receive until one task ends."""
-        tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectra, self._send_rates, self._receive)]
+        tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectra, self._receive)]
         _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in others:
             task.cancel()
@@ -169,16 +169,6 @@ class Viewer:
                 lines, block = found
                 await self._send_text(lines)
                 await self._socket.send_bytes(block)
-            await asyncio.sleep(SPECTRUM_PERIOD)
-
-    async def _send_rates(self) -> None:
-        """Send the pump rates to avoid in the posture shown if the page does not have them."""
-        sent = None
-        while not self._socket.closed:
-            found = await self._analyst.rates_at(self._position)
-            if found is not sent:
-                sent = found
-                await self._send_text({"kind": "rates", **found})
             await asyncio.sleep(SPECTRUM_PERIOD)
 
     @property

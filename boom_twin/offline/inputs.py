@@ -29,7 +29,6 @@ class ReplayOptions:
 
     progress: Progress | None = None
     mapping: str | Path | None = None
-    changes: bool = True
     health: bool = True
     window: TimeWindow = WHOLE
     namespace: str = ""

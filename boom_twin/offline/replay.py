@@ -29,7 +29,7 @@ from ..system.result_folder import REPLAY, result_folder
 from ..system.result_text import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, CONSEQUENCES, EVENTS, SampleBlock
 from ..twin.twin import Twin, drive
-from ..types import SENSORS, Array, Change, StrokeReading
+from ..types import SENSORS, Array, StrokeReading
 from .ground_truth import TipErrors, TipTruth, truth_in
 from .inputs import USUAL, ReplayInputs, ReplayOptions, replay_inputs
 from .progress import Progress
@@ -102,7 +102,6 @@ def replay(
     settings: Settings | None = None,
     progress: Progress | None = None,
     mapping: str | Path | None = None,
-    changes: bool = True,
     health: bool = True,
     window: TimeWindow = WHOLE,
     namespace: str = "",
@@ -111,7 +110,8 @@ def replay(
 ) -> Replay:
     """Replay `bag` through a twin of `scene`; writes ``summary.json`` and ``bag/`` into `out`.
 
-    A table of readings is written as a session into ``session/`` of `out` first, as `boom_twin import` does.
+    Recorded changes (load, limits, zeros, restarts from static equilibrium) are repeated at the same stamps. A table of
+    readings is written as a session into ``session/`` of `out` first, as `boom_twin import` does.
 
     Parameters
     ----------
@@ -130,8 +130,6 @@ def replay(
     mapping : path, optional
         File like ``msg_config/topics.yaml`` with names and units of topics and sensors; by default that of the session, else
         the package's own.
-    changes : bool
-        True to repeat recorded changes (load, limits, zeros, restarts from static equilibrium) at the same stamps.
     health : bool
         True to judge the rig's health, see `Report.health`.
     window : TimeWindow, optional
@@ -160,7 +158,7 @@ def replay(
     """
     is_path = isinstance(bag, str | Path)
     with result_folder(Path(out), REPLAY, [Path(bag)] if is_path else []) as building:
-        options = ReplayOptions(progress, mapping, changes, health, window, namespace, with_bag, causes)
+        options = ReplayOptions(progress, mapping, health, window, namespace, with_bag, causes)
         if is_path:
             return replay_into(building, bag, scene, settings, options)
         from ..bag.import_session import import_session
@@ -214,7 +212,7 @@ def replay_into(
         began = time.perf_counter()
         stack.enter_context(quick_switches())
         items = stack.enter_context(closing(read_ahead(samples)))
-        for step in drive(twin, twin.take, (item for item in items if options.changes or not isinstance(item, Change))):
+        for step in drive(twin, twin.take, items):
             if bar is not None:
                 bar.update(1 if step is None else len(step[0].stamps))
             if step is None:

@@ -37,7 +37,7 @@ class TopicFeed(Feed):
         depth = 1000  # messages that may wait for the next look, for every topic: seconds of a session
         self._node = rclpy.create_node(NAME)
         topics = topics.renamed(lambda topic: resolved_topic(topic, self._node).name)
-        super().__init__("live", Store(), topics, scene, boom=self._node.get_namespace())
+        super().__init__("live", Store(), topics, scene)
         shown = [topics.inputs[Stream.IMU], *topics.outputs.values(), topics.events]
         self._heard: list[tuple[Subscription[Any], str]] = []
         for topic in shown:

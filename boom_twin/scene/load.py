@@ -170,7 +170,6 @@ PLAUSIBILITY: tuple[Check, ...] = (
     sizes.beams,
     sizes.rigid_parts,
     sizes.moving_parts,
-    geometry.clear_cylinders,
 )
 """Checks of parts against each other, for a scene without faults."""
 

@@ -10,12 +10,12 @@ from analysis.resting import resting
 from oracle import booms
 from oracle.clearance import rigid
 from oracle.clearance.scenes import PINS, RADII, RODS, with_pins
+from reference.contact_law import Contact, stiffness
 from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
 
 from boom_twin import statics
 from boom_twin.kernels.elements.pin_contact import LEAST_GAP, SMOOTH
-from boom_twin.validation.contact_law import Contact, stiffness
 
 POSTURES = ["horizontal", "arch", "high", "low"]
 DOCUMENT = booms.document()

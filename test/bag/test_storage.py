@@ -1,4 +1,4 @@
-"""The thread that writes a recording: splits, disks that fill up or stall, and kills."""
+"""The thread that writes a recording: disks that fill up or stall, and kills."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rosbags.highlevel import AnyReader
 
 from boom_twin import BagError, Stream
 from boom_twin.bag import async_writer as module
-from boom_twin.bag.async_writer import FileSplit, Storage
+from boom_twin.bag.async_writer import Storage
 from boom_twin.bag.writer import BagWriter, recorded
 
 TOPIC = load_topics().inputs[Stream.STROKES]
@@ -43,20 +43,14 @@ def fill(storage: Storage, count: int) -> list[int]:
     return storage.close()
 
 
-@pytest.mark.parametrize(("split", "files"), [(FileSplit(), 1), (FileSplit(duration=0.5), 5), (FileSplit(size=9_000), None)])
-def test_splits(tmp_path: Path, split: FileSplit, files: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("boom_twin.bag.writer.CHUNK_SIZE", 4096)
-    assert fill(Storage(BagWriter(tmp_path / "bag", {"note": "n"}), split, pytest.fail), 500) == [500]
+def test_a_recording_is_whole(tmp_path: Path) -> None:
+    assert fill(Storage(BagWriter(tmp_path / "bag", {"note": "n"}), pytest.fail), 500) == [500]
     metadata = read_metadata(tmp_path / "bag" / "metadata.yaml")
-    assert len(metadata.relative_file_paths) == (files or len(metadata.files)) > bool(split.size)
-    assert sum(file["message_count"] for file in metadata.files) == metadata.message_count == 500
+    assert [file["message_count"] for file in metadata.files] == [metadata.message_count] == [500]
     assert numbers(tmp_path / "bag") == list(range(500))
     with AnyReader([tmp_path / "bag"]) as reader:
         assert reader.message_count == sum(1 for _ in reader.messages()) == 500
-    for name in metadata.relative_file_paths:  # each can be read alone
-        assert scan(tmp_path / "bag" / name).notes == {"note": "n"}
-        if split.size:
-            assert (tmp_path / "bag" / name).stat().st_size < split.size + 3 * 4096
+    assert scan(tmp_path / "bag" / metadata.relative_file_paths[0]).notes == {"note": "n"}
 
 
 def test_a_recording_without_its_end_is_noticed_and_recovered(tmp_path: Path) -> None:
@@ -77,9 +71,9 @@ FULL = """
 import sys
 from pathlib import Path
 sys.path.insert(0, {here!r})
-from bag.test_storage import BagError, BagWriter, FileSplit, Storage, message, recorded, TOPIC
+from bag.test_storage import BagError, BagWriter, Storage, message, recorded, TOPIC
 import resource, time
-storage = Storage(BagWriter(Path({bag!r})), FileSplit(), print)
+storage = Storage(BagWriter(Path({bag!r})), print)
 key = storage.add(recorded(TOPIC))
 resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
 try:
@@ -124,7 +118,7 @@ def test_a_disk_that_stalls_holds_up_no_message(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr("os.fsync", lambda file: answers.wait(60.0) and real(file))
     flushed, flush = list[int](), BagWriter.flush
     monkeypatch.setattr(BagWriter, "flush", lambda bag: (flushed.append(bag.counts.total()), flush(bag))[1])
-    storage = Storage(BagWriter(tmp_path / "bag"), FileSplit(), told.append)
+    storage = Storage(BagWriter(tmp_path / "bag"), told.append)
     key = storage.add(recorded(TOPIC))
     for number in range(300):
         storage.put(key, number, message(number), number, number)
@@ -155,7 +149,7 @@ def test_a_disk_that_never_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(module, "FLUSH", 0.01)
     monkeypatch.setattr(module, "PATIENCE", 0.2)
     monkeypatch.setattr(BagWriter, "flush", stuck)
-    storage = Storage(BagWriter(tmp_path / "bag"), FileSplit(), lambda text: None)
+    storage = Storage(BagWriter(tmp_path / "bag"), lambda text: None)
     key = storage.add(recorded(TOPIC))
     assert is_stuck.wait(60.0)
     with pytest.raises(BagError, match="does not keep up: 0 MiB of messages wait"):
@@ -173,8 +167,8 @@ KILLED = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, {here!r})
-from bag.test_storage import BagWriter, FileSplit, Storage, message, recorded, TOPIC
-storage = Storage(BagWriter(Path({bag!r})), FileSplit({size}, None), print)
+from bag.test_storage import BagWriter, Storage, message, recorded, TOPIC
+storage = Storage(BagWriter(Path({bag!r})), print)
 key = storage.add(recorded(TOPIC))
 for number in range(10**6):
     storage.put(key, time.time_ns(), message(number), 0, number)
@@ -183,14 +177,12 @@ for number in range(10**6):
 """
 
 
-@pytest.mark.parametrize(
-    ("more", "size"), [(60, None), *(pytest.param(40 * k, 30_000, marks=[pytest.mark.slow] * (k < 5)) for k in range(6))]
-)
+@pytest.mark.parametrize("more", [60, *(pytest.param(40 * k, marks=pytest.mark.slow) for k in range(5))])
 @pytest.mark.system
-def test_a_kill_costs_little(tmp_path: Path, more: int, size: int | None) -> None:
+def test_a_kill_costs_little(tmp_path: Path, more: int) -> None:
     """A recording is killed so many messages after its second flush, which has all that was put before the first had ended."""
     bag = tmp_path / "bag"
-    program = KILLED.format(here=str(Path(__file__).parents[1]), bag=str(bag), size=size)
+    program = KILLED.format(here=str(Path(__file__).parents[1]), bag=str(bag))
     child = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
     assert child.stdout is not None
     flushed, written = list[int](), 0

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from default_boom import strokes_of_posture
-from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Settings, Stream, load_scene
 from boom_twin.config.settings import Thresholds
-from boom_twin.deviation.estimate_row import WIDTH
-from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
-from boom_twin.diagnostics.model_status import stress_model, stress_status
+from boom_twin.diagnostics.levels import Level, Status
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch
-from boom_twin.twin.blocks import estimate_of
 from boom_twin.types import USUAL_STREAMS, Residuals
 
 NAMES = {stream: stream.value for stream in USUAL_STREAMS}
@@ -166,23 +160,6 @@ def test_a_model_that_is_too_slow_and_clocks_that_differ(rig: Rig) -> None:
     angles = found["joint_angles"]
     assert angles.level == Level.WARN and "stamped behind the strokes" in angles.message
     assert angles.values["clock_offset_s"] == pytest.approx(0.08) and angles.values["clock_offset_s_warn"] == 0.05
-
-
-def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() -> None:
-    scene, strokes = load_scene(), strokes_of_posture(load_scene(), "horizontal")
-    prediction = drive_twin(scene).update(Sample(Stream.STROKES, 10**18, strokes)).prediction
-    model, judge = stress_model(scene), ComponentJudge("bending")
-    assert model is not None and prediction is not None
-    for load, largest in ((np.zeros(2), -94.4), (np.array([0.0, -100.0]), -98.1)):
-        variance = np.full(2, 400.0)
-        estimate = replace(estimate_of(10**18, np.zeros(WIDTH)), load=load, load_variance=variance)
-        judge.begin(Evaluation(Thresholds(), 0.0, 0.0))
-        status = stress_status(judge, model, prediction, estimate)
-        assert status.level == Level.OK and status.values["largest_at"] == "section 1 at 0.60 m"
-        assert status.values["largest_MPa"] == pytest.approx(largest, abs=0.1)
-    assert status.values["section_1_at_0.60_m_sigma_MPa"] == pytest.approx(0.73, rel=0.02)
-    rigid = scene.model_copy(update={"modes": 0})
-    assert stress_model(rigid) is None
 
 
 def test_the_sources_of_pressures_are_watched_by_the_forces_that_they_give(rig: Rig) -> None:

@@ -67,17 +67,17 @@ def test_the_scene_has_no_warning(table: Path, capsys: pytest.CaptureFixture[str
     assert "Warnings: none" in capsys.readouterr().out and Path("my_boom.png").is_file()
 
 
-def test_a_range_that_pins_do_not_allow_is_warned_of(
+def test_a_range_that_pins_do_not_allow_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     text = (EXAMPLES / "zr_fold_20m_table.yaml").read_text(encoding="utf-8")
     table = tmp_path / "zr_fold_table.yaml"
-    table.write_text(text.replace("[-174, 0]", "[-180, 0]"), encoding="utf-8")
-    assert main(["init", "--table", table.name, "--out", "zr_fold.yaml"]) == 0
+    table.write_text(text.replace("[-174, 0]", "[-205, 0]"), encoding="utf-8")
+    assert main(["init", "--table", table.name, "--out", "zr_fold.yaml"]) == 1
     assert capsys.readouterr().err.strip() in QUOTES
     table.write_text(text, encoding="utf-8")
-    assert main(["init", "--table", table.name, "--out", "zr_fold.yaml", "--force"]) == 0
+    assert main(["init", "--table", table.name, "--out", "zr_fold.yaml"]) == 0
     assert main(["check", "zr_fold.yaml", "--strict"]) == 0
 
 

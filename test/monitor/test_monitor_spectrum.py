@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from boom_twin import load_scene
 from boom_twin.analysis.posture_modes import ModeList
-from boom_twin.monitor.data.analyst import RateList, spectrum
+from boom_twin.monitor.data.analyst import spectrum
 
 RATE = 200.0
 TIMES = np.arange(int(40 * RATE)) / RATE
@@ -47,15 +47,11 @@ def test_missing_rows_and_uneven_times_do_no_harm() -> None:
     assert spectrum(times[:1000], values[:1000]) is None and spectrum(times[:0], values[:0]) is None
 
 
-def test_modes_and_rates_to_avoid_follow_the_posture() -> None:
-    """The rates as the resonance map gives them for a pump of any height."""
+def test_modes_follow_the_posture() -> None:
     scene = load_scene()
-    modes, rates, strokes = ModeList(scene), RateList(scene), strokes_of_posture(scene, "arch")
-    natural, first = modes.at(strokes), rates.at(strokes)
+    modes, strokes = ModeList(scene), strokes_of_posture(scene, "arch")
+    natural = modes.at(strokes)
     assert natural == pytest.approx([1.0618, 2.3006, 5.3833, 11.0895, 41.996, 47.265], rel=1e-3)
-    assert not first["trouble"] and any(low < natural[0] < high for low, high in first["avoid"])
-    assert any(low < natural[0] / 3.0 < high for low, high in first["avoid"]), "its third harmonic"
-    assert rates.at(strokes + 0.001) is first and modes.at(strokes + 0.001) is natural
-    assert rates.at(strokes + 0.02)["avoid"] != first["avoid"] and modes.at(strokes + 0.02) != natural
-    found = RateList(scene).at([9.0, 0.5, 0.5, 0.5])
-    assert found["avoid"] == () and "stroke_1 = 9 m" in found["trouble"]
+    assert modes.at(strokes + 0.001) is natural
+    assert modes.at(strokes + 0.02) != natural
+    assert ModeList(scene).at([9.0, 0.5, 0.5, 0.5]) == []

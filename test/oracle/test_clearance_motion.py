@@ -10,12 +10,12 @@ from compiled import compile_scene
 from default_boom import strokes_of_posture
 from oracle.clearance import rigid
 from oracle.clearance.scenes import RODS, with_pins
+from reference.contact_law import HYSTERESIS, Contact
 from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
 
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.kernels.elements.pin_contact import SMOOTH
-from boom_twin.validation.contact_law import HYSTERESIS, Contact
 
 MOVE, END = 0.2, 0.3  # s
 TRAVEL = (0.03, 0.02, 0.02, 0.02)  # m

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-KNOWN = {"scene.schema", "validation.contact_law"}
+KNOWN = {"scene.schema"}
 NAMES = {"Scene", "SolverError", "UsageError"}
 
 

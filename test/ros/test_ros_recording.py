@@ -67,7 +67,7 @@ def recorded(
     scene.write_text(default_text() + "# a copy\n")
     node = spawn_node("--params-file", str(PARAMETERS), "-p", f"scene:={scene}", "-p", f"mapping:={mapping}")
     node.wait_for("active;")
-    recorder = spawn("boom_twin.cli.main", "record", "--out", str(out), "--mapping", str(mapping), "--split-duration", "1.5")
+    recorder = spawn("boom_twin.cli.main", "record", "--out", str(out), "--mapping", str(mapping))
     player = Player(scan(reliable_bag))
     recorder.wait_for(COMPLETE)
     assert player.wait(60.0, listeners=2) == []

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from command import main
 from default_boom import clearance_text, default_text, example_names, example_text, with_end_mark
-from scene.editing import OIL, example, put
+from scene.editing import OIL, put
 
 from boom_twin import SceneError, load_scene
 from boom_twin.scene.summary import explain
@@ -130,32 +130,6 @@ def test_a_range_that_ends_next_to_a_dead_centre_warns_and_the_suggested_one_kee
 def first_number(remedy: str) -> float:
     """Return the lower end of the range that a remedy suggests."""
     return float(remedy.partition("[")[2].partition(",")[0])
-
-
-PASSING = {
-    "mirrored": (2, (1.37, 0.75), {"C": [-1.994, -0.146], "D": [-0.301, 0.032], "E": [0.25, -0.285], "lL": 0.791, "lR": 0.629},
-                 ("0.115 m", "[-5, ")),
-    "left": (1, (2.40, 1.18), {"C": [-3.019, 0.475], "D": [-0.164, -0.196], "E": [0.05, 0.355], "lL": 0.669, "lR": 0.599},
-             ("0.135 m", "[-165, 5]")),
-}  # fmt: skip
-"""Six-bars of the Z fold, with bore and rod known, whose rods pass the pivot: what is needed, and the range to narrow to."""
-
-
-@pytest.mark.parametrize("case", PASSING)
-def test_a_rod_that_passes_a_pin_is_warned_of(bench: Any, case: str) -> None:
-    (i, (closed, stroke), keys, words), values = PASSING[case], example("five_section_z_fold")
-    values["joints"][i].update(keys)
-    values["joints"][i]["cylinder"].update(closed_length=closed, max_stroke=stroke)
-    (told,) = bench.oddities_of(values)
-    assert told.path == f"joints[{i}].C"
-    assert all(word in str(told) for word in (*words, "of cylinder", "from the pivot")), str(told)
-    values["joints"][i]["range_deg"], values["postures"] = suggested(told.remedy), {"arch": values["postures"]["arch"]}
-    assert bench.oddities_of(values) == []
-
-
-def suggested(remedy: str) -> list[float]:
-    """Return the range at the end of a remedy."""
-    return [float(angle) for angle in remedy.rpartition("[")[2].rstrip("].").split(",")]
 
 
 def test_a_scene_in_millimetres_warns_at_its_lengths(bench: Any) -> None:

@@ -1,4 +1,4 @@
-"""Analysis of the shown data, in threads: spectrum, natural frequencies of the model, pump rates to avoid."""
+"""Analysis of the shown data, in threads: spectrum, natural frequencies of the model."""
 
 from __future__ import annotations
 
@@ -9,13 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.signal import find_peaks
 
-from ...analysis.frequency_response import UPWARD, linearised_boom
-from ...analysis.posture_modes import MOVED, ModeList, PresentPosture
+from ...analysis.posture_modes import MOVED, ModeList
 from ...analysis.sample_series import SEGMENT, power_density, spacing
-from ...analysis.steady_state import TOO_MUCH
-from ...errors import BoomTwinError
-from ...scene.pump_pulses import CHANGE_OVER
-from ...scene.schema import Scene
 from ...types import Array
 from ..protocol import SPECTRUM, pack
 from .feed import Feed
@@ -39,47 +34,6 @@ SIGNALS = (
     PREDICTION,
 )
 """The best first: the prediction knows nothing of what shakes the boom."""
-RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)  # of the response of the tip, Hz
-
-
-Rates = dict[str, Any]
-"""Content of the message ``rates``: in ``avoid`` ranges of pump rates (Hz), in ``trouble`` why they are not known."""
-
-
-class RateList(PresentPosture[Rates]):
-    """Pump rates to avoid, from the frequency response of the tip to 1 N there."""
-
-    def __init__(self, scene: Scene) -> None:
-        super().__init__()
-        self._scene = scene
-
-    def _work_out(self, strokes: Array) -> Rates:
-        try:
-            boom = linearised_boom(self._scene, strokes)
-            response = boom.respond(RESPONSE_FREQUENCIES, boom.load(UPWARD)).tip_acceleration
-        except BoomTwinError as error:
-            return {"avoid": (), "trouble": str(error)}
-        return {"avoid": rates_to_avoid(np.linalg.norm(response, axis=1)), "trouble": ""}
-
-
-PUMP_RATES = np.linspace(0.2, 1.2, 201)  # rates of a pump, Hz
-HARMONICS = np.arange(1, 16, 2)  # harmonics of pump pulses that are on for half a period; there are no even ones
-
-
-def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
-    """Return the ranges of pump rates (Hz) at which the tip swings `TOO_MUCH` times as far as at the median rate.
-
-    `accelerations` (k,) of the tip (m/s^2) by 1 N are at `RESPONSE_FREQUENCIES`. The rule is that of
-    `boom_twin.analysis.steady_state`: root mean square for peak to peak.
-    """
-    swings = accelerations / (2.0 * np.pi * RESPONSE_FREQUENCIES) ** 2
-    at = HARMONICS * PUMP_RATES[:, None]
-    force = np.sinc(at * CHANGE_OVER) / HARMONICS
-    swing = np.sqrt(np.square(force * np.interp(at, RESPONSE_FREQUENCIES, swings)).sum(axis=1))
-    above = np.concatenate([[False], swing > TOO_MUCH * np.median(swing), [False]])
-    starts, stops = np.flatnonzero(above[1:] & ~above[:-1]), np.flatnonzero(above[:-1] & ~above[1:]) - 1
-    return tuple((float(PUMP_RATES[a]), float(PUMP_RATES[b])) for a, b in zip(starts, stops, strict=True))
-
 
 SPECTRUM_SPAN = 40.0  # time span of the spectrum, up to the shown time, s
 
@@ -128,18 +82,13 @@ def _peaks(frequencies: Array, density: Array, rate: float) -> list[dict[str, fl
     return peaks
 
 
-UNKNOWN_SCENE: Rates = {"avoid": (), "trouble": "the model is not known: give --scene"}
-UNKNOWN_POSTURE: Rates = {"avoid": (), "trouble": "the posture is not known yet"}
-
-
 class Analyst:
-    """Analysis of one feed, one computation of a kind at a time, because the model has one workspace."""
+    """Analysis of one feed, one computation at a time, because the model has one workspace."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
         self._modes: ModeList | None = None
-        self._rates: RateList | None = None
-        self._turn, self._rates_turn = asyncio.Lock(), asyncio.Lock()
+        self._turn = asyncio.Lock()
         self._known: tuple[tuple[int, int], tuple[dict[str, Any], bytes]] | None = None
 
     async def spectrum_at(self, time: float) -> tuple[dict[str, Any], bytes] | None:
@@ -166,20 +115,6 @@ class Analyst:
             lines = {"kind": "lines", "natural": natural, "peaks": peaks, "source": signal.name, "axes": signal.axes}
             self._known = key, ({**lines, "moved": moved if moved > MOVED else 0.0}, block)
             return self._known[1]
-
-    async def rates_at(self, time: float) -> Rates:
-        """Return the pump rates to avoid in the posture at `time` (s); the same object while the boom has not moved.
-
-        It has a model of its own, so that no spectrum waits for the first one, which compiles for half a minute.
-        """
-        async with self._rates_turn:
-            scene, strokes = self._feed.scene(), self._feed.strokes(time)
-            if scene is None:
-                return UNKNOWN_SCENE
-            if len(strokes) != len(scene.joints):
-                return UNKNOWN_POSTURE
-            self._rates = self._rates or RateList(scene)
-            return await asyncio.to_thread(self._rates.at, strokes)
 
     def _signal(self, time: float) -> Signal:
         """Return the best acceleration that has values in the last segment before `time` (s)."""

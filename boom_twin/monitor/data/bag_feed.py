@@ -85,7 +85,7 @@ def bag_feed(
     reads = given.strokes.reading
     if not is_published and topics.inputs[reads.stream].absolute not in counts:
         raise BagError(f"{path}: nothing to show. It needs {reads.named}, or outputs of the twin.")
-    feed = BagFeed(_title(session, is_published), store, topics, given.scene, given.length, namespace)
+    feed = BagFeed(_title(session, is_published), store, topics, given.scene, given.length)
     if is_published:
         feed.begin(_take_published(session, feed, topics, counts, window))
     else:

@@ -20,13 +20,11 @@ class Feed:
     """Source of the page's data: a store and the reader that fills it; its `title` says in words what is shown.
 
     Without a `scene` it is the package's own, if the node says that it uses that; no file is opened that a message names.
-    `end` (s) is the length of a recorded session, None if it is live. `boom` is the namespace of its node.
+    `end` (s) is the length of a recorded session, None if it is live.
     """
 
-    def __init__(
-        self, title: str, store: Store, topics: Topics, scene: Scene | None = None, end: float | None = None, boom: str = ""
-    ) -> None:
-        self.title, self.store, self.end, self.boom = title, store, end, boom.strip("/")
+    def __init__(self, title: str, store: Store, topics: Topics, scene: Scene | None = None, end: float | None = None) -> None:
+        self.title, self.store, self.end = title, store, end
         self.topic_rows = TopicRows(store, topics)
         self.trouble = ""  # why there is not more to be had
         self.phase = ""  # what is done before data can be shown, in words

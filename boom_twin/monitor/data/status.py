@@ -19,7 +19,7 @@ MAX_NODES, FORGET_AFTER = 200, 60.0  # number of nodes above which those that ha
 GROUPS = ("sensors", "model", "residuals", "timing", "recorder")
 HEALTH = "health"  # the status that stands for all alarms of the rig's health
 SENSOR_GROUPS = ("sensor", "residual")  # kinds of statuses that speak of one channel, as an alarm of the rig's health does
-WITH_FIGURES = ("swing", "tip load", "model")  # statuses whose values are kept, for the page and for ``/metrics``
+WITH_FIGURES = ("swing", "tip load")  # statuses whose values the page shows
 _LIMITS = ("_error", "_warn", "_stale")
 
 
@@ -118,7 +118,7 @@ def _lamp(name: str, status: Any, clock: float) -> StatusLamp:
 
 
 def _group(name: str) -> str:
-    if name in ("model", "swing", "tip load", "bending"):
+    if name in ("model", "swing", "tip load"):
         return "model"
     kind = name.split(" ")[0]
     return {"sensor": "sensors", "residual": "residuals", HEALTH: "residuals", "recording": "recorder"}.get(kind, "timing")

@@ -16,7 +16,6 @@ from rclpy.qos import LivelinessPolicy, QoSCompatibility, QoSProfile, qos_check_
 from ...bag.advice import extra_names_message, strange_names_message
 from ...config.settings import Thresholds
 from ...diagnostics.levels import Level, Value
-from ...diagnostics.model_status import stress_model
 from ...diagnostics.sensor_status import sensors_of
 from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch
@@ -137,8 +136,7 @@ class Diagnostics:
         """Watch a newly configured twin."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts, twin.absent)
         self._lags = lambda: twin.clocks
-        stress = stress_model(twin.scene, twin.reads)
-        self.watch = TwinWatch(sensors, self._inputs, self.watch.thresholds, stress=stress)
+        self.watch = TwinWatch(sensors, self._inputs, self.watch.thresholds)
         self._queue.oddities.clear()
         self._counts = {"samples": twin.counts, "messages": decoder.oddities, "received": self._queue.oddities}
         self._scene, self._joints, self._decoder = scene, twin.plan.joints, decoder

@@ -1,27 +1,21 @@
-"""Geometry of a scene: pins on their parts; a joint over its range; pins in the way of a cylinder.
+"""Geometry of a scene: pins on their parts; a joint over its range.
 
 Over its range the links of a joint meet, its strokes are within reach and unique, it keeps clear of dead centres, and it holds
 the named postures.
-
-A cylinder lies amid the section, where the pivot's pin and those of the links pass through. Its barrel is taken as thick as its
-bore and two walls, its rod as thick as it is, a pin as half the bore. Only `oil` gives them: a cylinder with `k` is not judged.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...config.yaml_text import Place
-from ...errors import Fault
 from ...types import Array
-from ..kinematics import barrel_pin_of, joint_curve, joint_pins, linkage, rod_pin_of
-from ..schema import Cylinder, Joint, Oil, Point, Scene
+from ..kinematics import joint_curve, linkage
+from ..schema import Joint, Point, Scene
 from ..segmentation import cylinder_pins
 from . import Draft, Findings
 
@@ -268,80 +262,3 @@ def intervals(degrees: Array, mask: Mask) -> str:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
     return ", ".join(f"{degrees[first]:.1f} to {degrees[last]:.1f} deg" for first, last in pairs)
-
-
-# -- pins in the way of a cylinder ----------------------------------------------------------------------------------------
-
-PIN = 0.5  # diameter of a pin over the bore
-
-
-def distances_to(point: Array, start: Array, end: Array) -> tuple[Array, Array]:
-    """Return the distance (m) of points from the line between two others, and where on it (0 to 1) that is; all x + iy."""
-    along = end - start
-    place = np.clip(((point - start) * along.conj()).real / np.abs(along) ** 2, 0.0, 1.0)
-    return np.abs(point - start - place * along), place
-
-
-class Pass(NamedTuple):
-    """A pin that a cylinder passes: its name, and at each angle the distance (m), what is needed, and whether of the barrel."""
-
-    pin: str
-    distance: Array
-    needed: Array
-    at_barrel: Mask
-
-
-def clear_cylinders(draft: Draft) -> Findings:
-    """Check all cylinders that have `oil`; of each the pin that is closest against what it needs."""
-    scene = draft.scene
-    for i, joint in enumerate(scene.joints):
-        if joint.cylinder.oil is not None:
-            degrees = grid_of(joint)
-            passes = list(passes_of(scene, i, joint.cylinder, joint.cylinder.oil, np.radians(degrees)))
-            worst = min(passes, key=lambda each: float(np.nanmin(each.distance / each.needed)), default=None)
-            if worst is not None and np.nanmin(worst.distance / worst.needed) < 1.0:
-                clear = np.all([each.distance >= each.needed for each in passes], axis=0)
-                yield _finding(draft, scene, i, worst, degrees, clear)
-
-
-def _finding(draft: Draft, scene: Scene, i: int, worst: Pass, degrees: Array, clear: Array) -> Fault:
-    at = int(np.nanargmin(worst.distance / worst.needed))
-    part, size = ("barrel", "half the barrel") if worst.at_barrel[at] else ("rod", "half the rod")
-    bound = (
-        f"at {degrees[at]:.0f} deg the {part} of cylinder {i + 1} passes {worst.distance[at]:.3f} m from {worst.pin}, where a "
-        f"boom has a pin; expected at least {worst.needed[at]:.3f} m, {size} and half a pin of half the bore"
-    )
-    pins = "C, D, E or the lengths of the links" if i else "cylinder_pin or rod_pin"
-    low, high = usable(degrees, np.where(clear, degrees, np.nan))
-    narrower = f", or narrow range_deg to [{low:g}, {high:g}]" if low < high else ""
-    place: Place = ("joints", i, "C") if i else ("base", "cylinder_pin")
-    value = scene.joints[i].C if i else scene.base.cylinder_pin
-    return draft.warning(place, value, bound, f"Look at `check --picture`; move {pins}{narrower}.")
-
-
-def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) -> Iterator[Pass]:
-    """Return the pins beside the cylinder's own two, in the axes of its carrier, as complex numbers x + iy, m."""
-    wall = 0.12  # of a barrel, over its bore
-    pins = joint_pins(scene, i, phi)
-    foot, rod_pin = pins.pop(barrel_pin_of(pins)), pins.pop(rod_pin_of(pins))
-    length = np.abs(rod_pin - foot)
-    barrel = 0.9 * cylinder.closed_length  # the rest is the rod's end and its eye
-    for name, pin in (pins | _pins_before(scene, i, pins["the pivot"])).items():
-        distance, place = distances_to(pin, foot, rod_pin)
-        at_barrel = place * length < barrel
-        radius = np.where(at_barrel, (0.5 + wall) * oil.bore, 0.5 * oil.rod)
-        yield Pass(name, distance, radius + 0.5 * PIN * oil.bore, at_barrel)
-
-
-def _pins_before(scene: Scene, i: int, pivot: Array) -> dict[str, Array]:
-    """Return the pins at the inboard end of the carrier of joint `i`, each shape as `pivot`."""
-    if i == 0:
-        return {}
-    carrier, before = scene.sections[i - 1], scene.joints[i - 1]
-    inner = carrier.rod_pin if i == 1 else before.E
-    found = {"the pivot before": pivot - carrier.length}
-    if inner is not None:
-        found["rod_pin of section 1" if i == 1 else "E of the joint before"] = np.asarray(
-            pivot + (complex(*inner) - carrier.length)
-        )
-    return found

@@ -19,11 +19,10 @@ import numpy as np
 
 from ...errors import UsageError
 from ...scene.kinematics import gravity_in_base
-from ...scene.schema import Cylinder, CylinderPart, Pin, RigidPart, Scene
+from ...scene.schema import Cylinder, CylinderPart, RigidPart, Scene
 from ...types import Array
 from . import exudyn, items
 from .linkages import Link, lump_masses, six_bar
-from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
 from .system import (
     Base,
     Boom,
@@ -187,10 +186,9 @@ def add_joint(boom: Boom, frames: list[Frame], index: int, stroke: float) -> Non
     if boom.lumps:
         _drive(boom, cylinder, (barrel_pin, rod_pin), stroke)
         return
-    worn = pin_with_play(boom.scene, index)
-    rod_end = _cylinder_part(boom, cylinder.rod, (rod_pin, barrel_pin), (ends[1], ends[0]), worn)
-    _drive(boom, cylinder, (barrel_pin, rod_end), stroke)
-    _cylinder_part(boom, cylinder.barrel, (barrel_pin, rod_end), ends)
+    _cylinder_part(boom, cylinder.rod, (rod_pin, barrel_pin), (ends[1], ends[0]))
+    _drive(boom, cylinder, (barrel_pin, rod_pin), stroke)
+    _cylinder_part(boom, cylinder.barrel, (barrel_pin, rod_pin), ends)
 
 
 def _six_bar(boom: Boom, frames: list[Frame], index: int) -> tuple[int, int, tuple[Array, Array]]:
@@ -241,21 +239,16 @@ def _drive(boom: Boom, cylinder: Cylinder, pins: tuple[int, int], stroke: float)
     boom.drives.append((int(drive), "referenceLength"))
 
 
-def _cylinder_part(
-    boom: Boom, part: CylinderPart | None, pins: tuple[int, int], ends: tuple[Array, Array], worn: Pin | None = None
-) -> int:
-    """Add barrel or rod, pinned at its own end; the two slide on each other. Return the marker of its end, worn or not."""
+def _cylinder_part(boom: Boom, part: CylinderPart | None, pins: tuple[int, int], ends: tuple[Array, Array]) -> None:
+    """Add barrel or rod, pinned at its own end; the two slide on each other."""
     if part is None or part.mass == part.inertia == 0.0:
-        return pins[0]
+        return
     axis = ends[1] - ends[0]
     angle = math.atan2(axis[1], axis[0])
     node = boom.node(ends[0] + part.com * axis / np.hypot(*axis), angle)
     body = boom.body(node, part.mass, (0.0, 0.0), part.inertia)
     own = boom.marker(body, (-part.com, 0.0))
-    if worn is None:
-        boom.pin(pins[0], own)
-    else:
-        boom.loosen(Bush(contact_of(boom.scene, worn), (pins[0], own), node))
+    boom.pin(pins[0], own)
     boom.system.AddObject(
         items.ObjectJointPrismatic2D(
             markerNumbers=[pins[1], own],
@@ -264,7 +257,6 @@ def _cylinder_part(
             constrainRotation=False,
         )
     )
-    return own if worn else pins[0]
 
 
 def build(
@@ -279,12 +271,11 @@ def build(
     """Build the undeformed boom with its drives at absolute `strokes` (m), shape (n,). Sensors may still be added.
 
     A flexible section has `elements` finite elements, at least one per part between cylinder brackets. `nodally_exact`: few
-    elements bend as many do, see `shear_stiffness`. `lumped`: see `linkages`; it needs ideal pins and a rigid base.
-    Sensors are at `sites`. UsageError for worn pins other than of rods, and for a lumped boom that cannot be.
+    elements bend as many do, see `shear_stiffness`. `lumped`: see `linkages`; it needs a rigid base.
+    Sensors are at `sites`. UsageError for worn pins, and for a lumped boom that cannot be.
     """
-    refuse_other_pins(scene)
-    if lumped and any(pin_with_play(scene, index) is not None for index in range(len(scene.joints))):
-        raise UsageError("clearance.pins: a rod pin with clearance needs the rod as a body. Build the boom with lumped=False.")
+    if scene.clearance is not None and scene.clearance.pins:
+        raise UsageError("clearance.pins: the virtual rig knows ideal pins only. Leave out the block clearance.")
     if lumped and scene.base.stiffness is not None:
         raise UsageError("base.stiffness: a boom of lumped masses needs a rigid base. Leave it out, or take lumped=False.")
     container = exudyn.SystemContainer()

@@ -1,9 +1,9 @@
 """Faults of the virtual rig: their notation, the booms that have them, and the readings of faulty sensors.
 
-`listing` names every cause with its kinds and sizes, in SI units. Faults of stiffness, load and clearance are physical:
+`listing` names every cause with its kinds and sizes, in SI units. Faults of stiffness and load are physical:
 `changes` puts them into the simulated boom. A fault of a drive changes the motion that the boom follows; a leaked stroke stays.
 Faults of sensors change rounded readings. A fault begins at its onset, grows linearly to its size over its ramp, and falls
-from its end on over the same time. A pin has its play from the start.
+from its end on over the same time.
 """
 
 from __future__ import annotations
@@ -19,31 +19,29 @@ import numpy as np
 
 from ...errors import UsageError
 from ...scene.edit import parameter, parameter_names, scaled, with_parameters
-from ...scene.schema import Clearance, CylinderPart, Joint, Pin, Scene
+from ...scene.schema import CylinderPart, Joint, Scene
 from ...types import SECOND, Array
 from .session import RigSession
 from .solve import Change, Drive
 
 _ANY, _MORE, _FACTOR = "finite and not 0", "above 0", "above 1"
-_SHARE, _LOSS, _PLAY = "above 0 and at most 1, a share", "above 0 and below 1, a share", "above 0 and below 0.005 m"
+_SHARE, _LOSS = "above 0 and at most 1, a share", "above 0 and below 1, a share"
 _HOLDS = {
     _ANY: lambda size: size != 0.0,
     _SHARE: lambda size: 0.0 < size <= 1.0,
     _LOSS: lambda size: 0.0 < size < 1.0,
     _MORE: lambda size: size > 0.0,
-    _PLAY: lambda size: 0.0 < size < 0.005,
     _FACTOR: lambda size: size > 1.0,
 }
 _SENSOR = {"bias": _ANY, "drift": _ANY, "scale": _ANY, "stuck": None, "noisy": _FACTOR, "spikes": _ANY, "dropout": _SHARE}
-_PHYSICAL = ("softer", "more", "less", "play")
-_WITHOUT_RAMP = ("drift", "stuck", "play")
+_PHYSICAL = ("softer", "more", "less")
+_WITHOUT_RAMP = ("drift", "stuck")
 _CAUSES: dict[str, dict[str, str | None]] = {
     r"cylinder_([1-9]\d*)\.k": {"softer": _LOSS},
     r"section_([1-9]\d*)\.EI": {"softer": _LOSS},
     r"base\.stiffness": {"softer": _LOSS},
     r"tip\.payload": {"more": _MORE, "less": _MORE},
     r"line_fill": {"more": _MORE, "less": _MORE},
-    r"cylinder_([1-9]\d*)\.rod\.clearance": {"play": _PLAY},
     r"cylinder_([1-9]\d*)\.drive": {"drift": _ANY},
     r"(?:joint|cylinder|cylinder_force)_([1-9]\d*)\.sensor": _SENSOR,
     r"joint_angles\.delay": {"late": _MORE},
@@ -55,7 +53,6 @@ _SIZES = {
     "more line_fill": "kg/m, at most the boom's mass over its reach",
     "less tip.payload": "kg, at most what the scene has",
     "less line_fill": "kg/m, at most what the scene has",
-    "play": "radial clearance of the rod pin, m",
     "bias": "rad, m or N; at most 1 rad, the travel, 1e6 N",
     "drift": "rad, m or N in a second",
     "scale": "share by which it reads too much, at most 1",
@@ -105,8 +102,6 @@ class RigFault:
             raise UsageError(f"fault {self}: end = {self.end:g} s, must be after {whole:g} s, when it is there in full.")
         if self.ramp and self.kind in _WITHOUT_RAMP:
             raise UsageError(f"fault {self}: {self.kind} does not come on over a time. Leave out +{self.ramp:g}.")
-        if self.kind == "play" and (self.onset or self.end < math.inf):
-            raise UsageError(f"fault {self}: a pin has its play from the start to the end. Leave out what follows @.")
 
     def __str__(self) -> str:
         size = f":{self.size:g}" if self.size else ""
@@ -227,26 +222,13 @@ def _gone(fault: RigFault, times: Array) -> Array:
 
 
 def with_faults(scene: Scene, faults: Sequence[RigFault]) -> Scene:
-    """Return `scene` with the physical ones of `faults` in full; UsageError if it lacks the parameter of one.
-
-    A pin that the scene does not list gets a journal of 25 mm radius.
-    """
+    """Return `scene` with the physical ones of `faults` in full; UsageError if it lacks the parameter of one."""
     for fault in faults:
-        if fault.kind == "play":
-            scene = _worn(scene, fault.cause.removesuffix(".clearance"), fault.size)
-        elif fault.is_physical:
+        if fault.is_physical:
             now = parameter(scene, fault.cause)
             changed = {"more": now + fault.size, "less": now - fault.size, "softer": now * (1.0 - fault.size)}
             scene = with_parameters(scene, {fault.cause: changed[fault.kind]})
     return scene
-
-
-def _worn(scene: Scene, at: str, more: float) -> Scene:
-    clearance = scene.clearance or Clearance()
-    pins = {pin.at: pin for pin in clearance.pins}
-    pin = pins.get(at) or Pin(at=at, pin_radius=0.025, radial_clearance=0.0)
-    pins[at] = pin.model_copy(update={"radial_clearance": pin.radial_clearance + more})
-    return scene.model_copy(update={"clearance": clearance.model_copy(update={"pins": tuple(pins.values())})})
 
 
 def wrong_by(scene: Scene, share: float, seed: int) -> Scene:

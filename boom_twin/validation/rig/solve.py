@@ -264,10 +264,6 @@ def settle(boom: Boom, strokes: Array) -> None:
     boom.system.Assemble()
     aim = f"the equilibrium at strokes {', '.join(f'{s:.6g}' for s in strokes)} m"
     find_equilibrium(boom.system, aim)
-    if boom.bushes:
-        for bush in boom.bushes:
-            bush.release(boom.system)
-        find_equilibrium(boom.system, f"{aim} with play in its pins")
 
 
 def _ratio(name: str, whole: float, step: float) -> int:

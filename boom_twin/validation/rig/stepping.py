@@ -187,13 +187,9 @@ def _feed(boom: Boom, course: Course, step: float) -> None:
 
     def before_step(_: Any, at: float) -> bool:
         hand_over(round(at / step))
-        for bush in boom.bushes:
-            bush.watch(boom.system)
         return True
 
     hand_over(0)
-    for bush in boom.bushes:
-        bush.entry = None
     boom.system.SetPreStepUserFunction(before_step)
 
 

@@ -12,7 +12,6 @@ from ...scene.kinematics import joint_angles_of_strokes
 from ...scene.schema import Cylinder, Point, Scene
 from ...types import Array
 from . import items
-from .pin_clearance import Bush
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +147,6 @@ class Boom:
     lumps: LumpedMasses | None  # masses of cylinders and two-force links, where these are no bodies
     sections: list[BuiltSection] = field(default_factory=list)
     drives: list[tuple[int, str]] = field(default_factory=list)  # connector of each cylinder, name of its length
-    bushes: list[Bush] = field(default_factory=list)  # pins with play
     tip_load: int = -1  # the external force at the tip
     sites: tuple[Site, ...] = ()  # where sensors are; the beams there have nodes
 
@@ -166,13 +164,6 @@ class Boom:
 
     def pin(self, one: int, other: int) -> None:
         self.system.AddObject(items.ObjectJointRevolute2D(markerNumbers=[one, other]))
-
-    def loosen(self, bush: Bush) -> None:
-        """Let two markers touch as journal and bush."""
-        self.system.AddObject(
-            items.ObjectConnectorCartesianSpringDamper(markerNumbers=[*bush.sides], springForceUserFunction=bush.spring)
-        )
-        self.bushes.append(bush)
 
     def node(self, place: Array, angle: float) -> int:
         return int(self.system.AddNode(items.NodeRigidBody2D(referenceCoordinates=[*place, angle])))

@@ -7,10 +7,9 @@ import pytest
 from oracle import booms, lagrange, segments
 from oracle.clearance import rigid
 from oracle.clearance.drop import PUBLISHED, rebound, restitution
+from reference.contact_law import HYSTERESIS, Contact, stiffness
 from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
-
-from boom_twin.validation.contact_law import HYSTERESIS, Contact, stiffness
 
 STEEL = stiffness(0.030, 1e-4, 2.06e11, 0.3)
 

@@ -21,10 +21,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from reference.contact_law import Contact
 from scipy.optimize import brentq
 
 from boom_twin import UsageError
-from boom_twin.validation.contact_law import Contact
 
 from . import geometry
 from .bodies import Lever, OilCylinder, SixBar

@@ -29,11 +29,6 @@ def test_faults_add_to_what_is_there():
     more = with_faults(scene, [parse("tip.payload:more:5"), parse("joint_1.sensor:bias:1")])
     less = with_faults(scene, [parse("tip.payload:less:20"), parse("line_fill:less:2")])
     assert (more.tip.payload, more.line_fill) == (65.0, 2.0) and less.tip.payload == 40.0 and not less.line_fill
-    worn = with_faults(load_scene(), [parse("cylinder_2.rod.clearance:play:0.0005")])
-    again = with_faults(worn, [parse("cylinder_2.rod.clearance:play:0.0002")])
-    ((first,), (second,)) = (each.pins_of("cylinder_2") for each in (worn, again))
-    assert first.at == "cylinder_2.rod" and first.radial_clearance == 5e-4
-    assert second.radial_clearance == pytest.approx(7e-4)
     with pytest.raises(UsageError, match=r"cylinder_1\.k: the scene has no such parameter"):
         with_faults(booms.scene_of(booms.one_rigid()), [parse("cylinder_1.k:softer:0.3")])
 

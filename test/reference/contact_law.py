@@ -1,4 +1,4 @@
-"""Contact law of a worn pin for the virtual rig and the tests' reference models: force over penetration and its rate.
+"""Contact law of a worn pin for the reference models: force over penetration and its rate.
 
 F = K d^n (1 + chi g' / v_in) >= 0 ,      d = (g + sqrt(g^2 + eps^2)) / 2 ,      g = |offset| - c
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot, log1p, sqrt, tanh
+from math import hypot, log1p, sqrt
 
 from scipy.optimize import brentq
 
@@ -46,15 +46,13 @@ def stiffness(pin_radius: float, clearance: float, young: float, poisson: float)
 
 @dataclass(frozen=True)
 class Contact:
-    """A pin in a bush. Friction opposes the sliding of the pin's centre around the bush; the pin's own turn makes none."""
+    """A pin in a bush, without friction."""
 
     stiffness: float  # K, N/m^n
     hysteresis: float  # chi
     clearance: float  # c, radial, m
     exponent: float = 1.5  # n
     smoothing: float = 0.0  # eps, m; 0 is the sharp gap
-    friction: float = 0.0  # coefficient
-    slip: float = 1e-2  # speed (m/s) at which tanh(speed / slip) of the friction acts
 
     def gap(self, offset: complex) -> float:
         """Return the gap |offset| - c, m: negative in flight."""
@@ -83,7 +81,7 @@ class Contact:
         outward = offset / distance
         along = rate * outward.conjugate()
         pressure = self.normal(distance - self.clearance, along.real, entry)
-        return complex(-pressure * outward * (1.0 + 1j * self.friction * tanh(along.imag / self.slip)))
+        return complex(-pressure * outward)
 
     def resting_offset(self, force: complex) -> complex:
         """Return the offset (m) of a pin at rest that presses on the bush with `force` (N, complex, not 0), along the force."""
