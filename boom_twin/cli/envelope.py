@@ -71,7 +71,7 @@ def _computed(scene: Scene) -> Envelope:
 
 
 def quantities_of(result: Envelope) -> list[Quantity]:
-    """Return all columns of numbers, in the order of the table; without stresses of sections that have no height."""
+    """Return all columns of numbers, in the order of the table; without moments and stresses that a section does not have."""
     found_columns = [Quantity("deflection_m", "tip deflection", result.deflections, 1e3, "mm")]
     for key, words, values, factor, unit in (
         ("cylinder_{}_force_N", "cylinder {} force", result.forces, 1e-3, "kN"),
@@ -107,6 +107,9 @@ def _report(result: Envelope, quantities: list[Quantity]) -> list[str]:
             row += [f"{quantity.factor * quantity.values[place]:.4g}", result.posture(place)]
         rows.append(row)
     lines += columns(rows, left=(0, 2, 4))
+    rigid = ", ".join(str(i) for i, moments in enumerate(result.moments.T, 1) if moments[0] != moments[0])
+    if rigid:
+        lines += ["", f"No moments of section {rigid}: it has no beam. Give it one, with modes: 0 if it shall not bend."]
     if not any(quantity.unit == "MPa" for quantity in quantities):
         lines += ["", "No stresses: give sections[i].height, the outer height of the box in m."]
     return lines
