@@ -43,6 +43,7 @@ def test_a_wrong_word_is_told_with_the_nearest(capsys: pytest.CaptureFixture[str
         (["views", "--out", "x", "--namespace", "a b"], "'a b': each part must begin with a letter"),
         (["monitor", "--port", "99999"], "99999: must be a whole number from 0 to 65535"),
         (["simulate", "--drive", "x.csv", "--out", "y.csv", "--rho", "1"], "1: must be below 1"),
+        (["check", "--need", "tip=1"], "a number of mm, cm or m is needed, with its unit"),
     ],
 )
 def test_a_value_out_of_its_bound_is_told(capsys: pytest.CaptureFixture[str], arguments: list[str], bound: str) -> None:
