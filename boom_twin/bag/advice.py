@@ -52,9 +52,12 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
 def remarks(info: BagInfo, topics: Topics) -> list[str]:
     """Return remarks on checksums, origin, clocks and messages that are not read."""
     found: list[str] = []
-    if not info.session.checked:
+    is_table = info.session.files[0].storage == "csv"
+    if is_table:
+        found.append("A table has no checksums and no note of its origin. `boom_twin import` makes a session with both.")
+    if not info.session.checked and not is_table:
         found.append("No checksums: a flipped bit cannot be noticed. Record with `boom_twin record`.")
-    if info.synthetic is None:
+    if info.synthetic is None and not is_table:
         found.append("Its origin is not noted, so whether a rig made it is unknown. Record with --origin.")
     inputs = topics.inputs.values()
     for topic in inputs:

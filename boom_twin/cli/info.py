@@ -91,7 +91,7 @@ def _gap_begin_s(tally: Tally, start: int) -> float | None:
 def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[str]:
     """Return the lines of text for `values` of `as_json`. Line breaks in names and notes are escaped."""
     made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[values["synthetic"]]
-    files = f"{len(values['files'])} {'file' if len(values['files']) == 1 else 'files'}"
+    files = _several(len(values["files"]), "file")
     distro = values["distro"] or "distribution not noted"
     version = f"metadata version {values['metadata_version']}" if values["metadata_version"] else "no metadata.yaml"
     profile = f"; profile {values['profile']}" if values["profile"] else ""
@@ -104,7 +104,7 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
         f"checksums {'present' if values['checksums'] else 'absent'}",
         f"written    by {values['library'] or 'an unnamed program'}{profile}, {distro}, {version}",
         f"made by    {values['origin'] or 'origin not noted'} ({made})",
-        f"scene      {values['scene']}, sha256 {values['scene_sha256'][:12]}.., {len(scene.scene.sections)} sections",
+        f"scene      {values['scene']}, sha256 {values['scene_sha256'][:12]}.., {_several(len(scene.scene.sections), 'section')}",
         f"mapping    {values['mapping']}",
         f"strokes    {StrokeReading(values['strokes']).text} ({values['strokes_source']})",
         f"lasts      {values['duration_s']:.3f} s, {values['messages']} messages{part}",
@@ -130,6 +130,10 @@ def _table(info: BagInfo) -> list[str]:
         own = [tally.name, tally.type, str(tally.count), _number(tally.rate, 2), _number(gap[0], 2), _number(gap[1], 3)]
         rows.append([*own, str(tally.not_increasing), str(tally.unset), *(_number(value, 3) for value in skew)])
     return columns(rows, left=(0, 1))
+
+
+def _several(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _number(value: float | None, digits: int) -> str:
