@@ -9,6 +9,8 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from ..system.result_text import json_text
 from .arguments import add_file, add_json, add_scene, files_of
 from .output import columns, open_scene, print_result
@@ -104,14 +106,15 @@ def _report(result: Envelope, quantities: list[Quantity]) -> list[str]:
     for quantity in quantities:
         row = [f"{quantity.words}, {quantity.unit}"]
         for place in (int(quantity.values.argmin()), int(quantity.values.argmax())):
-            row += [f"{quantity.factor * quantity.values[place]:.4g}", result.posture(place)]
+            row += [f"{round(quantity.factor * quantity.values[place], 9) + 0.0:.4g}", result.posture(place)]
         rows.append(row)
     lines += columns(rows, left=(0, 2, 4))
-    rigid = ", ".join(str(i) for i, moments in enumerate(result.moments.T, 1) if moments[0] != moments[0])
-    if rigid:
-        lines += ["", f"No moments of section {rigid}: it has no beam. Give it one, with modes: 0 if it shall not bend."]
-    if not any(quantity.unit == "MPa" for quantity in quantities):
-        lines += ["", "No stresses: give sections[i].height, the outer height of the box in m."]
+    rigid, bare = np.isnan(result.moments[0]), np.isnan(result.stresses[0])
+    for lacking, told in (
+        (rigid, "No moments of section {}: it has no beam. Give it one, with modes: 0 if it shall not bend."),
+        (bare & ~rigid, "No stresses of section {}: give its height, the outer height of the box in m."),
+    ):
+        lines += ["", told.format(", ".join(map(str, np.flatnonzero(lacking) + 1)))] if lacking.any() else []
     return lines
 
 

@@ -92,6 +92,7 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
     """Return the lines of text for `values` of `as_json`. Line breaks in names and notes are escaped."""
     made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[values["synthetic"]]
     files = _several(len(values["files"]), "file")
+    sections = _several(len(scene.scene.sections), "section")
     distro = values["distro"] or "distribution not noted"
     version = f"metadata version {values['metadata_version']}" if values["metadata_version"] else "no metadata.yaml"
     profile = f"; profile {values['profile']}" if values["profile"] else ""
@@ -104,7 +105,7 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
         f"checksums {'present' if values['checksums'] else 'absent'}",
         f"written    by {values['library'] or 'an unnamed program'}{profile}, {distro}, {version}",
         f"made by    {values['origin'] or 'origin not noted'} ({made})",
-        f"scene      {values['scene']}, sha256 {values['scene_sha256'][:12]}.., {_several(len(scene.scene.sections), 'section')}",
+        f"scene      {values['scene']}, sha256 {values['scene_sha256'][:12]}.., {sections}",
         f"mapping    {values['mapping']}",
         f"strokes    {StrokeReading(values['strokes']).text} ({values['strokes_source']})",
         f"lasts      {values['duration_s']:.3f} s, {values['messages']} messages{part}",

@@ -96,7 +96,7 @@ def test_every_command_is_told_and_every_told_command_is_one() -> None:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_options_of_pages_are_in_the_help_and_those_of_the_help_on_a_page(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_of_pages_and_of_the_help_are_the_same(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     pages = [path.read_text(encoding="utf-8") for path in PAGES if path.name not in NOT_OF_NOW]
     blocks = "\n".join(block for page in pages for block in FENCED.findall(page))
     lines = [re.split(" #|--ros-args", line)[0] for line in re.findall(rf"^boom_twin {name}\b(.*)", blocks, re.MULTILINE)]
