@@ -39,6 +39,7 @@ def run(args: Namespace) -> int:
 def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: SessionStrokes) -> dict[str, Any]:
     """Return the facts of a session. Lists of figures have an entry for each of ``topics``."""
     from ..bag.advice import missing, remarks
+    from ..bag.session_model import settings_of
 
     session, metadata, tallies = info.session, info.session.metadata, info.tallies
     topics, joints = mapped.topics, len(scene.scene.joints)
@@ -79,7 +80,7 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: Session
         "strokes_source": strokes.source,
         "scene_sha256": scene.sha256,
         "wiring": None,
-        "missing_for_replay": missing(info, topics, joints, scene.source),
+        "missing_for_replay": missing(info, topics, joints, scene.source, settings_of(session.path).settings.gap),
         "remarks": remarks(info, topics),
     }
 

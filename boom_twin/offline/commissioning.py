@@ -122,6 +122,9 @@ def commission(
     model = RestModel(loaded(own.scene, *settings.load), reads, places)
     found = check(model, declared(mapped.topics, joints), series)
     if found is None:
+        if not series[Stream.STROKES]:
+            topic = mapped.topics.inputs[Stream.STROKES].name
+            raise BagError(f"{session.path}: no readings of {topic}. The check needs the strokes of all cylinders.")
         names = [sensor.name for sensor in mapped.topics.sensors_of(Stream.STROKES, joints).values()]
         heard = series[Stream.STROKES]
         silent = [name for name in names if name not in heard or not np.isfinite(heard[name].values).any()]
