@@ -36,8 +36,8 @@ class Envelope:
     deflections: Array  # (m,), distance of the tip from that of rigid sections and cylinders, m
     forces: Array  # (m, n), cylinder forces, N, positive in tension
     frequencies: Array  # (m, k), Hz, ascending, at most `FREQUENCY_COUNT`
-    moments: Array  # (m, n), bending moment of largest size in each section, N m; 0 in rigid ones
-    stresses: Array  # (m, n), that size over the section modulus, Pa; NaN where the section has no height
+    moments: Array  # (m, n), bending moment of largest size in each section, N m; NaN in sections without a beam
+    stresses: Array  # (m, n), that size over the section modulus, Pa; NaN where the section has no beam or height
     skipped: dict[str, int]  # number of postures of scene and grid that are left out, by reason
     searched: int  # number of postures, the last ones, that the search found
 
@@ -89,8 +89,10 @@ class _Boom:
     def __init__(self, scene: Scene) -> None:
         self._scene, self._plan = scene, compile_scene(scene)
         self._state, self._work = self._plan.state(), self._plan.work()
-        self._bending = moments_by_unknowns(self._plan)
-        self._owners = np.array([station.section for station in stations(scene)], dtype=int)
+        bending = with_stiff_beams(scene)
+        self._bent = None if bending is scene else compile_scene(bending)
+        self._bending = moments_by_unknowns(self._bent or self._plan)
+        self._owners = np.array([station.section for station in stations(bending)], dtype=int)
         self._chain = np.array(scene.base.pivot), np.array([section.length for section in scene.sections])
         self._bounds = np.radians([joint.range_deg for joint in scene.joints])
         self.skipped = dict.fromkeys(("out of a cylinder's travel", "no equilibrium"), 0)
@@ -105,15 +107,24 @@ class _Boom:
             return None
         try:
             settle(plan, state, work, strokes, relative)
+            bent = self._bent_unknowns(strokes, relative)
             found = natural_modes(plan, state, work, modes, frequency_accuracy) if modes else ()
         except SolverError:
             self.skipped["no equilibrium"] += 1
             return None
         tip, (headings, pivots) = state.frames[-1, :2], rigid_chain(*self._chain, relative)
         forces = taken_apart(plan, first_row(plan, state)).cylinder_forces
-        moments = _largest(self._bending @ state.z, self._owners, plan.joints)
+        moments = _largest(self._bending @ bent, self._owners, plan.joints)
         deflection, frequencies = np.hypot(*(tip - pivots[-1])), [mode.frequency for mode in found]
         return np.concatenate([np.degrees(headings), tip, [deflection], forces, moments, frequencies])
+
+    def _bent_unknowns(self, strokes: Array, relative: Array) -> Array:
+        """Return the unknowns, at rest, of the boom in which every section with a beam bends."""
+        if self._bent is None:
+            return self._state.z
+        state = self._bent.state()
+        settle(self._bent, state, self._bent.work(), strokes, relative)
+        return state.z
 
     def extreme(self, grid: Array, k: int, sign: float) -> Array | None:
         """Return the row of largest ``sign * row[k]`` that is found from the best of `grid`; None if none is better."""
@@ -140,4 +151,19 @@ class _Boom:
 
 
 def _largest(values: Array, owners: Array, count: int) -> Array:
-    return np.array([max(values[owners == owner], key=abs, default=0.0) for owner in range(count)])
+    return np.array([max(values[owners == owner], key=abs, default=np.nan) for owner in range(count)])
+
+
+def with_stiff_beams(scene: Scene) -> Scene:
+    """Return the scene with nearly rigid beams instead of rigid ones, so that their moments are among the unknowns.
+
+    The limit of growing EI and EA is the rigid beam, with the same moments. `scene` itself, if no beam is rigid.
+    """
+    stiffer, shapes = 1e4, 3
+    sections = tuple(
+        section.model_copy(update={"modes": shapes, "axial": False, "I": stiffer * section.I, "A": stiffer * section.A})
+        if section.beam is not None and section.I is not None and section.A is not None and not scene.is_flexible(i)
+        else section
+        for i, section in enumerate(scene.sections)
+    )
+    return scene if sections == scene.sections else scene.model_copy(update={"sections": sections})

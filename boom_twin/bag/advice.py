@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from ..errors import BagError
 from ..messages.cdr_decoder import CdrDecoder
 from ..messages.sample_decoder import MOST_NAMES
 from ..messages.topic_table import Qos, Topic, Topics
-from ..types import SECOND, SENSORS, Stream
+from ..types import NANO, SECOND, SENSORS, Stream
 from .inspect import BagInfo, Tally, spacing_faults
 from .metadata import profiles
 from .reader import Session, TopicInfo, check_topic, read_blocks, readable
@@ -25,10 +26,10 @@ SKEW = 0.05
 """Threshold (s) for a reported clock difference. A boom moves by centimetres in that time."""
 
 
-def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list[str]:
+def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "", gap: float = math.inf) -> list[str]:
     """Return a sentence for each input of a replay that the session lacks, the worst first.
 
-    `scene` is the source of the scene, named in the sentences.
+    `scene` is the source of the scene, named in the sentences. `gap` (s) is the setting of that name.
     """
     found: list[str] = []
     with suppress(BagError):  # the loop below tells it
@@ -46,15 +47,24 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
             continue
         if (tally := info.tally(topic.name)) is not None:
             found += _stamps(tally)
+            usual = float(np.median(np.abs(np.diff(tally.stamps)))) * NANO if tally.count > 1 else 0.0
+            if stream is topics.stroke_reading.stream and usual > gap:
+                found.append(
+                    f"{tally.name}: most stamps are {usual:.3g} s apart. The setting gap, {gap:g} s, leaves such samples out. "
+                    "Record at 10 Hz or more, or raise gap in a file for --params."
+                )
     return found
 
 
 def remarks(info: BagInfo, topics: Topics) -> list[str]:
     """Return remarks on checksums, origin, clocks and messages that are not read."""
     found: list[str] = []
-    if not info.session.checked:
+    is_table = info.session.files[0].storage == "csv"
+    if is_table:
+        found.append("A table has no checksums and no note of its origin. `boom_twin import` makes a session with both.")
+    if not info.session.checked and not is_table:
         found.append("No checksums: a flipped bit cannot be noticed. Record with `boom_twin record`.")
-    if info.synthetic is None:
+    if info.synthetic is None and not is_table:
         found.append("Its origin is not noted, so whether a rig made it is unknown. Record with --origin.")
     inputs = topics.inputs.values()
     for topic in inputs:

@@ -27,11 +27,12 @@ def spacing_faults(stamps: NDArray[np.int64]) -> Iterator[str]:
     if len(back := np.flatnonzero(steps < 0)):
         one, two = (stamps[back[0] : back[0] + 2] - stamps.min()) * NANO
         told = "Look for a counter that wraps, a clock that was set, two publishers, or a looped bag"
-        yield f"{len(back)} stamps step back, the first from {one:.3f} to {two:.3f} s. {told}."
+        times = "once" if len(back) == 1 else f"{len(back)} times"
+        yield f"stamps step back {times}, first from {one:.3f} to {two:.3f} s. {told}."
     if shared := int((steps == 0).sum()):
         most = int(np.diff(np.flatnonzero(np.r_[1, steps, 1])).max())
         told = f"up to {most} readings share one, of which one is used. Export more digits, or look for two publishers"
-        yield f"{shared} stamps are that of the one before: {told}."
+        yield f"{shared} of {len(stamps)} stamps equal the one before: {told}."
     if len(ahead := steps[steps > 0]) > around:
         largest = np.lib.stride_tricks.sliding_window_view(np.pad(ahead, around // 2, "edge"), around + 1).max(axis=1)
         starts = np.flatnonzero(ahead >= tiny * largest)

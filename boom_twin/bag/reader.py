@@ -300,7 +300,12 @@ def check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
     if topic is None:
         names = [known.name for known in session.topics]
         near = get_close_matches("/" + name.lstrip("/"), names, n=1, cutoff=0.5)
-        remedy = f"Did you mean {near[0]}?" if near else "Record it, or give its name in a mapping."
+        remedy = "Record it, or give its name in a mapping."
+        if near and near[0].endswith(own := "/" + name.lstrip("/")):
+            namespace = near[0].removesuffix(own).lstrip("/")
+            remedy = f"Give {near[0]} as its name in a mapping, or `boom_twin replay --namespace {namespace}`."
+        elif near:
+            remedy = f"If {near[0]} is that topic, give its name in a mapping. Else record it."
         if (below := f"rt/{name.lstrip('/')}") in names:
             remedy = f"Its names are those of DDS, not of ROS: give {below} as the topic's name in a mapping."
         raise BagError(f"{session.path}: no topic {name}; the session has {', '.join(names) or 'none'}. {remedy}")

@@ -9,6 +9,8 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from ..system.result_text import json_text
 from .arguments import add_file, add_json, add_scene, files_of
 from .output import columns, open_scene, print_result
@@ -71,7 +73,7 @@ def _computed(scene: Scene) -> Envelope:
 
 
 def quantities_of(result: Envelope) -> list[Quantity]:
-    """Return all columns of numbers, in the order of the table; without stresses of sections that have no height."""
+    """Return all columns of numbers, in the order of the table; without moments and stresses that a section does not have."""
     found_columns = [Quantity("deflection_m", "tip deflection", result.deflections, 1e3, "mm")]
     for key, words, values, factor, unit in (
         ("cylinder_{}_force_N", "cylinder {} force", result.forces, 1e-3, "kN"),
@@ -104,11 +106,15 @@ def _report(result: Envelope, quantities: list[Quantity]) -> list[str]:
     for quantity in quantities:
         row = [f"{quantity.words}, {quantity.unit}"]
         for place in (int(quantity.values.argmin()), int(quantity.values.argmax())):
-            row += [f"{quantity.factor * quantity.values[place]:.4g}", result.posture(place)]
+            row += [f"{round(quantity.factor * quantity.values[place], 9) + 0.0:.4g}", result.posture(place)]
         rows.append(row)
     lines += columns(rows, left=(0, 2, 4))
-    if not any(quantity.unit == "MPa" for quantity in quantities):
-        lines += ["", "No stresses: give sections[i].height, the outer height of the box in m."]
+    rigid, bare = np.isnan(result.moments[0]), np.isnan(result.stresses[0])
+    for lacking, told in (
+        (rigid, "No moments of section {}: it has no beam. Give it one, with modes: 0 if it shall not bend."),
+        (bare & ~rigid, "No stresses of section {}: give its height, the outer height of the box in m."),
+    ):
+        lines += ["", told.format(", ".join(map(str, np.flatnonzero(lacking) + 1)))] if lacking.any() else []
     return lines
 
 

@@ -39,6 +39,7 @@ def run(args: Namespace) -> int:
 def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: SessionStrokes) -> dict[str, Any]:
     """Return the facts of a session. Lists of figures have an entry for each of ``topics``."""
     from ..bag.advice import missing, remarks
+    from ..bag.session_model import settings_of
 
     session, metadata, tallies = info.session, info.session.metadata, info.tallies
     topics, joints = mapped.topics, len(scene.scene.joints)
@@ -79,7 +80,7 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: Session
         "strokes_source": strokes.source,
         "scene_sha256": scene.sha256,
         "wiring": None,
-        "missing_for_replay": missing(info, topics, joints, scene.source),
+        "missing_for_replay": missing(info, topics, joints, scene.source, settings_of(session.path).settings.gap),
         "remarks": remarks(info, topics),
     }
 
@@ -91,7 +92,8 @@ def _gap_begin_s(tally: Tally, start: int) -> float | None:
 def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[str]:
     """Return the lines of text for `values` of `as_json`. Line breaks in names and notes are escaped."""
     made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[values["synthetic"]]
-    files = f"{len(values['files'])} {'file' if len(values['files']) == 1 else 'files'}"
+    files = _several(len(values["files"]), "file")
+    sections = _several(len(scene.scene.sections), "section")
     distro = values["distro"] or "distribution not noted"
     version = f"metadata version {values['metadata_version']}" if values["metadata_version"] else "no metadata.yaml"
     profile = f"; profile {values['profile']}" if values["profile"] else ""
@@ -104,7 +106,7 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
         f"checksums {'present' if values['checksums'] else 'absent'}",
         f"written    by {values['library'] or 'an unnamed program'}{profile}, {distro}, {version}",
         f"made by    {values['origin'] or 'origin not noted'} ({made})",
-        f"scene      {values['scene']}, sha256 {values['scene_sha256'][:12]}.., {len(scene.scene.sections)} sections",
+        f"scene      {values['scene']}, sha256 {values['scene_sha256'][:12]}.., {sections}",
         f"mapping    {values['mapping']}",
         f"strokes    {StrokeReading(values['strokes']).text} ({values['strokes_source']})",
         f"lasts      {values['duration_s']:.3f} s, {values['messages']} messages{part}",
@@ -130,6 +132,10 @@ def _table(info: BagInfo) -> list[str]:
         own = [tally.name, tally.type, str(tally.count), _number(tally.rate, 2), _number(gap[0], 2), _number(gap[1], 3)]
         rows.append([*own, str(tally.not_increasing), str(tally.unset), *(_number(value, 3) for value in skew)])
     return columns(rows, left=(0, 1))
+
+
+def _several(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _number(value: float | None, digits: int) -> str:

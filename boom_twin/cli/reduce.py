@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..scene.edit import Edit
 
 
-FORM = "give the error that the tip may have, like tip=1mm, tip=0.5cm or tip=0.001 (m)"
+FORM = "give the error that the tip may have, with its unit, like tip=1mm, tip=0.5cm or tip=0.001m"
 ANOTHER = "Another motion may differ: an error holds for the motion on which it was measured."
 FREE = "Damping and the compliance of cylinders cost no time, so they stay."
 MEANING = {
@@ -51,10 +51,8 @@ def tip_error(text: str) -> float:
     """Return the value of ``--need`` in m; raise ArgumentTypeError if it is not of the form ``tip=1mm``."""
     what, _, size = text.partition("=")
     value = quantity(size, "m")
-    try:
-        value = float(size) if value is None else value
-    except ValueError:
-        value = "a length is needed"
+    if value is None:
+        value = "a number of mm, cm or m is needed, with its unit"
     if what.strip() != "tip":
         raise ArgumentTypeError(f"{text!r}: only the error of the tip can be stated; {FORM}")
     if isinstance(value, str) or not 0.0 < value < math.inf:
@@ -121,7 +119,7 @@ def write(source: str | None, scene: Scene, proposal: Proposal, most: float, out
 
     text = default_text() if source is None else read_text(Path(source))
     head = [
-        f"# Lean model of {source or 'the default scene'}, by boom_twin check --need tip={most:g}:",
+        f"# Lean model of {source or 'the default scene'}, by boom_twin check --need tip={most:g}m:",
         *(f"#   {edit}" for edit in proposal.edits),
         f"# Tip at most {_length(proposal.deviation.worst)} from the full model's, at rest in the postures and in a move",
         f"# ({proposal.course.motion.label}).",

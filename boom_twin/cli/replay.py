@@ -115,8 +115,7 @@ def _write(args: Namespace, found: Evaluation, out: Path, paint: Painter | None)
 
 
 def as_text(summary: dict[str, Any]) -> list[str]:
-    from ..health.sensor_monitor import noise_as_text
-    from ..offline.recording import alarm_as_text
+    from ..offline.recording import alarm_as_text, noise_told
 
     lines = [
         f"samples            {summary['samples']} in {summary['duration_s']:.1f} s",
@@ -139,7 +138,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         lines += _errors(summary)
     if "tip_load" in summary:
         lines.append(f"load at the tip    {summary['tip_load']}")
-    lines += [f"noise              {told}" for told in [*summary.get("read_out", []), *noise_as_text(summary)]]
+    lines += [f"noise              {told}" for told in noise_told(summary)]
     if summary["output_sha256"] is None:
         lines.append("result bag         not written (--no-bag)")
     alarms = summary["alarms"]

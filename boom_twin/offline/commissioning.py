@@ -25,7 +25,7 @@ from ..scene.schema import Scene
 from ..twin.blocks import CODES, SampleBlock
 from ..twin.twin import Twin
 from ..types import SENSORS, Array, Place, Stream, StrokeReading
-from ..wiring.check import STROKES_ALONE, Checked, Verdict, check, finding
+from ..wiring.check import ABSENT, STROKES_ALONE, Checked, Verdict, check, finding, likely, reading
 from ..wiring.hypotheses import SLACK, si
 from ..wiring.readings import Channel, Lag, RestModel, Series, Window, is_checked, lag_of
 from .inputs import of_another_boom
@@ -71,11 +71,19 @@ def wiring_of(bag: Path, scene: SceneSource | SessionScene, mapping: str | Path 
         found = commission(bag, scene, mapping, TimeWindow(window.start, duration), with_lags=False)
     except (BagError, UsageError) as error:
         return f"not checked: {str(error).splitlines()[0].rstrip('.')}"
+    absent = [f"{channel} is {ABSENT}" for channel in found.absent]
+    remedy = f". `boom_twin mapping --check {bag}` proposes a mapping" if absent or found.wrong else ""
     if not found.wrong:
-        still = "" if found.checked.moved else f", as far as a boom tells that stands still for {duration:g} s"
-        return "; else ".join([*found.lost, STROKES_ALONE if found.checked.has_strokes_alone else f"as expected{still}"])
-    told = "; ".join(f"{each.channel} {finding(each, found.checked)}" for each in found.wrong)
-    return f"{told}. `boom_twin mapping --check {bag}` proposes a mapping"
+        still = "" if found.checked.moved else ", as far as a boom at rest shows"
+        rest = STROKES_ALONE if found.checked.has_strokes_alone else f"as expected{still}"
+        return "; else ".join([*found.lost, *absent, rest]) + remedy
+    wrong = [
+        f"{each.channel}: declared as `{reading(each.declared)}`, found `{likely(each)}`"
+        if each.is_sure
+        else f"{each.channel} {finding(each, found.checked)}"
+        for each in found.wrong
+    ]
+    return "; ".join(wrong + absent) + remedy
 
 
 def is_late(lag: Lag) -> bool:
@@ -114,6 +122,9 @@ def commission(
     model = RestModel(loaded(own.scene, *settings.load), reads, places)
     found = check(model, declared(mapped.topics, joints), series)
     if found is None:
+        if not series[Stream.STROKES]:
+            topic = mapped.topics.inputs[Stream.STROKES].name
+            raise BagError(f"{session.path}: no readings of {topic}. The check needs the strokes of all cylinders.")
         names = [sensor.name for sensor in mapped.topics.sensors_of(Stream.STROKES, joints).values()]
         heard = series[Stream.STROKES]
         silent = [name for name in names if name not in heard or not np.isfinite(heard[name].values).any()]

@@ -15,6 +15,7 @@ from ..analysis.load_spectrum import TipLoad, TipLoadFinder
 from ..analysis.sample_series import ColumnStatistics
 from ..config.settings import Settings
 from ..health.alarms import Alarms, evidence_with_cause
+from ..health.sensor_monitor import noise_as_text
 from ..predictions import Clock
 from ..system.received_files import sha256_of
 from ..twin.blocks import CODES, STREAMS, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined
@@ -114,7 +115,7 @@ class ReadOut:
         for code, q in self._steps.items():
             kind = SENSORS[STREAMS[code]]
             if kind.resolution and np.isfinite(q) and q**2 > 12.0 * settings.variance(kind):
-                told = f"{kind.title}: readings come in steps of {q:g} (SI units): set {kind.resolution} to that"
+                told = f"{kind.title}: readings come in steps of {q:g} {kind.unit}: set {kind.resolution} to that"
                 found.append(f"{told}, or sensors look stuck or noisy")
         return {"read_out": found} if found else {}
 
@@ -296,6 +297,13 @@ def alarm_as_text(alarm: dict[str, Any]) -> str:
     end = "the end" if alarm["to_s"] is None else f"{alarm['to_s']:.2f} s"
     evidence = f" ({alarm['evidence']})" if alarm["evidence"] else ""
     return f"{alarm['channel']}, {max(0.0, alarm['from_s']):.2f} s to {end}: {alarm['told']}{evidence}"
+
+
+def noise_told(summary: dict[str, Any]) -> list[str]:
+    """Return advice on settings of noise and resolution; none while a sensor is wired otherwise, as in another unit."""
+    if any(alarm["kind"] == "wiring" for alarm in summary["alarms"]):
+        return []
+    return [*summary.get("read_out", []), *noise_as_text(summary)]
 
 
 def _load(load: TipLoad | None) -> dict[str, Any]:

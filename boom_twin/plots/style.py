@@ -177,8 +177,9 @@ def colours_of_times(figure: Figure, axes: Any, times: Array, label: str) -> Cal
 
 
 def legend_above(axes: Axes, columns: int = 1, top: float = 1.0, **look: Any) -> None:
-    """Draw a legend above the right end of `axes`; `top` is its lower edge as a fraction of the axes' height."""
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, top), ncols=columns, borderaxespad=0.1, **look)
+    """Draw a legend, if anything has a label, above the right end of `axes`; `top` is its lower edge over the axes' height."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, top), ncols=columns, borderaxespad=0.1, **look)
 
 
 def limits(*arrays: Array, around: float | None = None) -> tuple[float, float]:

@@ -14,9 +14,8 @@ from markupsafe import Markup
 
 from .. import __version__
 from ..analysis.free_vibration import Vibration
-from ..health.sensor_monitor import noise_as_text
 from ..offline.history import course
-from ..offline.recording import Recording
+from ..offline.recording import Recording, noise_told
 from ..plots import AlarmSpan
 from ..plots.results import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import DEPTH_BY_GYRATION
@@ -118,7 +117,7 @@ def _facts(found: Evaluation) -> list[tuple[str, object]]:
         *_uncertainty(recording),
         *((name, summary[key]) for key, name in AGAINST_TRUTH if key in summary),
         *([("load at the tip that the model does not know", summary["tip_load"])] if "tip_load" in summary else []),
-        *(("noise", told) for told in [*summary.get("read_out", []), *noise_as_text(summary)]),
+        *(("noise", told) for told in noise_told(summary)),
     ]
 
 

@@ -104,7 +104,7 @@ def section_angles(scene: Scene, posture: str) -> tuple[float, ...]:
         remedy = "Choose one of these, or give the angle of every section to the horizontal, deg: 60,20,-30."
         raise UsageError(f"posture = {posture!r}: the scene has {known}. {remedy}") from None
     if len(angles) != len(scene.joints):
-        raise UsageError(f"posture = {posture!r}: {len(angles)} angles for {len(scene.joints)} sections. Give one for each.")
+        raise UsageError(f"posture = {posture!r}: {len(angles)} of {len(scene.joints)} section angles. Give one for each.")
     for i, (joint, angle) in enumerate(zip(scene.joints, np.diff(angles, prepend=0.0).tolist(), strict=True)):
         low, high = joint.range_deg
         if not low - math.degrees(MARGIN) <= angle <= high + math.degrees(MARGIN):

@@ -22,6 +22,7 @@ Finite = Annotated[float, Field(ge=-LARGEST_VALUE, le=LARGEST_VALUE, allow_inf_n
 Positive = Annotated[float, Field(gt=0, le=LARGEST_VALUE, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST_VALUE, allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
+Inclination = Annotated[float, Field(ge=-1.571, le=1.571)]  # a base leans by less than a quarter turn
 Modes = Annotated[int, Field(ge=0, le=10)]
 Mass = Annotated[NotNegative, Field(description="the mass in kg")]
 Inertia = Annotated[NotNegative, Field(description="the inertia about the centre of mass in kg m^2")]
@@ -59,7 +60,7 @@ class Base(Part):
 
     pivot: Point = Field(description="[x, y] of the pin of section 1, m")
     cylinder_pin: Point = Field(description="[x, y] of the barrel pin of cylinder 1, m")
-    inclination: Finite = Field(default=0.0, description="the turn of the base, rad")
+    inclination: Inclination = Field(default=0.0, description="the turn of the base in rad, or with its unit, like 5 deg")
     stiffness: Positive | None = Field(default=None, description="the stiffness of the hinge on the ground, N m/rad")
     damping: NotNegative | None = Field(default=None, description="the damping of that hinge, N m s/rad")
 

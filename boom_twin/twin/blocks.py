@@ -240,7 +240,7 @@ EVENTS = {
     "gap": "longer pause between strokes, bridged",
     "restart": "pause too long to bridge, or strokes elsewhere after it; started again from rest",
     "stroke elsewhere": "a stroke jumped where its cylinder cannot go, and stayed there for a second; started from rest",
-    "leap": "stamp far from its stream; left out, the next is used if it follows within `gap` (raise it below 10 Hz)",
+    "leap": "stamp far from its stream; left out, the next is used if it follows within `gap` (raise it for rates below 10 Hz)",
     "jump back": "time was set back; started again from rest",
     "second source": "samples of another source among those that are followed; left out",
     "implausible": "a stroke where its cylinder cannot be; left out, for up to a second if it jumped there",

@@ -293,9 +293,10 @@ STROKES_ALONE = "strokes are within the travels; swapped or shifted ones show on
 
 
 def reading(way: Channel) -> str:
+    """Return name, unit and all unusual values of a sensor as its mapping has them."""
     parts = [way.name, way.unit]
     parts += ["sign -1"] if way.sign < 0 else []
-    parts += [f"zero {way.zero:.6g}"] if way.zero else []
+    parts += [f"zero {way.zero:.6g} {way.unit}"] if way.zero else []
     parts += [f"scale {way.scale:g}"] if way.scale != 1.0 else []
     parts += [f"absolute at the {way.absolute}"] if way.absolute else []
     parts += [f"turned by {math.degrees(way.turned):+.1f} deg"] if way.turned else []

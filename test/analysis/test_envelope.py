@@ -60,13 +60,33 @@ def test_extremes_between_the_postures_of_the_grid_are_found(boom: Scene, found:
     assert statics(boom, posture=found.posture(row)).cylinder_forces[0] == pytest.approx(found.forces[row, 0], rel=2e-3)
 
 
-def test_moment_and_stress_at_the_root_are_those_by_hand(boom: Scene, found: Envelope) -> None:
-    """Of all that lies outboard of the root of section 2, held there: the cylinder's lever is within the section before."""
+def by_hand(boom: Scene) -> float:
+    """Moment of all that lies outboard of the root of section 2, held there: the cylinder's lever is in the section before."""
     section = boom.sections[1]
     assert section.beam is not None and section.rho_A is not None and section.head is not None
     x0, x1 = section.beam
-    moment = 9.81 * (section.rho_A * (x1 - x0) ** 2 / 2 + section.head.mass * (section.head.com[0] - x0))
-    assert -found.moments[0, 1] == pytest.approx(moment, rel=5e-3)
+    return 9.81 * (section.rho_A * (x1 - x0) ** 2 / 2 + section.head.mass * (section.head.com[0] - x0))
+
+
+def test_rigid_sections_have_moments_if_they_have_beams(
+    boom: Scene, found: Envelope, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rigid = envelope(boom.with_({"modes": 0}))
+    assert -rigid.moments[0, 1] == pytest.approx(by_hand(boom), rel=1e-3)
+    assert rigid.moments[:2] == pytest.approx(found.moments[:2], rel=5e-3)
+    assert rigid.frequencies.shape[1] == 2 and rigid.stresses[0, 0] == pytest.approx(found.stresses[0, 0], rel=5e-3)
+    block = {"length": 5.0, "root": {"mass": 100.0, "com": [2.5, 0.0], "inertia": 200.0}}
+    path = tmp_path / "block.json"
+    one = boom.model_dump(exclude_none=True) | {"modes": 0}
+    path.write_text(json.dumps(one | {"sections": [one["sections"][0], block]}), encoding="utf-8")
+    assert main(["envelope", str(path)]) == 0
+    told = capsys.readouterr().out
+    assert "section 1 bending moment" in told and "section 2 bending moment" not in told
+    assert "No moments of section 2: it has no beam." in told and "No stresses" not in told
+
+
+def test_moment_and_stress_at_the_root_are_those_by_hand(boom: Scene, found: Envelope) -> None:
+    assert -found.moments[0, 1] == pytest.approx(by_hand(boom), rel=5e-3)
     inertia = boom.sections[0].I
     assert inertia is not None
     assert found.stresses[:, 0] == pytest.approx(np.abs(found.moments[:, 0]) * 0.1 / inertia)

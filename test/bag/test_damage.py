@@ -79,7 +79,7 @@ def test_counts_are_compared(bag: Path, content: Content) -> None:
 
 
 def test_a_topic_that_is_not_there_or_of_another_type_is_refused(bag: Path) -> None:
-    with pytest.raises(BagError, match=r"no topic joint_angels;.*/cylinder_strokes, .* Did you mean /joint_angles\?"):
+    with pytest.raises(BagError, match=r"no topic joint_angels;.*/cylinder_strokes, .* If /joint_angles is that topic"):
         read(scan(bag), {"joint_angels": JOINT_STATE})
     with pytest.raises(BagError, match="/tip_imu has type 'sensor_msgs/msg/Imu', not sensor_msgs/msg/JointState"):
         read(scan(bag), {"tip_imu": JOINT_STATE})

@@ -11,6 +11,7 @@ from default_boom import default_text
 
 from boom_twin.cli.replay import flat
 from boom_twin.offline.progress import ProgressLine
+from boom_twin.offline.recording import noise_told
 
 STROKES = "0.63,0.165,0.235,0.187"
 
@@ -43,6 +44,7 @@ def test_a_wrong_word_is_told_with_the_nearest(capsys: pytest.CaptureFixture[str
         (["views", "--out", "x", "--namespace", "a b"], "'a b': each part must begin with a letter"),
         (["monitor", "--port", "99999"], "99999: must be a whole number from 0 to 65535"),
         (["simulate", "--drive", "x.csv", "--out", "y.csv", "--rho", "1"], "1: must be below 1"),
+        (["check", "--need", "tip=1"], "a number of mm, cm or m is needed, with its unit"),
     ],
 )
 def test_a_value_out_of_its_bound_is_told(capsys: pytest.CaptureFixture[str], arguments: list[str], bound: str) -> None:
@@ -90,6 +92,11 @@ def test_a_summary_as_json_is_flat_and_has_its_alarms() -> None:
         "samples": 3, "events_not_followed": 2, "alarm_channel": ["joint_2", "joint_3"], "alarm_kind": ["residual"] * 2,
         "alarm_from_s": [4.0] * 2, "alarm_to_s": [None] * 2, "alarm_cause": ["cylinder_2.k"] * 2,
     }  # fmt: skip
+
+
+def test_no_setting_is_advised_for_readings_in_another_unit() -> None:
+    found = {"read_out": ["joint angles: readings come in steps"], "alarms": [{"kind": "jump"}]}
+    assert noise_told(found) == found["read_out"] and noise_told({**found, "alarms": [{"kind": "wiring"}]}) == []
 
 
 @pytest.mark.parametrize("is_terminal", [True, False])

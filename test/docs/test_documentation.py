@@ -96,7 +96,7 @@ def test_every_command_is_told_and_every_told_command_is_one() -> None:
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_options_that_pages_give_a_command_are_in_its_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_of_pages_and_of_the_help_are_the_same(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     pages = [path.read_text(encoding="utf-8") for path in PAGES if path.name not in NOT_OF_NOW]
     blocks = "\n".join(block for page in pages for block in FENCED.findall(page))
     lines = [re.split(" #|--ros-args", line)[0] for line in re.findall(rf"^boom_twin {name}\b(.*)", blocks, re.MULTILINE)]
@@ -106,6 +106,7 @@ def test_options_that_pages_give_a_command_are_in_its_help(name: str, capsys: py
         known = capsys.readouterr().out
         told = {option for line in lines if kind in line for option in re.findall(r"(?<= )--[a-z-]+", line)}
         assert [option for option in told if option not in known] == []
+        assert [option for option in set(re.findall(r"--[a-z-]+", known)) if not any(option in page for page in pages)] == []
 
 
 def test_topics_are_those_of_the_table() -> None:

@@ -47,7 +47,7 @@ def test_strokes_that_come_too_rarely_are_not_told_by_the_residuals_that_lack(tm
     stamps, still = START + np.arange(400) * STEP, np.tile(strokes, (400, 1))
     still[np.arange(400) % 40 > 0] = np.nan  # angles 40 times as often
     write_session(tmp_path / "bag", stamps, still, np.zeros_like(still), None, {"origin": "synthetic, a test"})
-    with pytest.raises(BagError, match=r"Most often leap: .* within `gap` \(raise it below 10 Hz\)"):
+    with pytest.raises(BagError, match=r"Most often leap: .* within `gap` \(raise it for rates below 10 Hz\)"):
         replay(tmp_path / "bag", load_scene(), tmp_path / "out")
 
 

@@ -44,7 +44,7 @@ def test_coarse_readings_are_told_once_with_the_setting_that_says_so(tmp_path: P
     write_session(tmp_path / "bag", stamps, step * np.round(strokes / step), None, None, {"origin": "synthetic, a test"})
     summary = replay(tmp_path / "bag", None, tmp_path / "out", with_bag=False).summary
     lines = [line for line in as_text(summary) if "readings come in steps" in line]
-    assert len(lines) == told and (not told or "of 0.001 (SI units): set stroke_resolution" in lines[0])
+    assert len(lines) == told and (not told or "of 0.001 m: set stroke_resolution" in lines[0])
     settings = Settings(stroke_resolution=step)
     assert "read_out" not in replay(tmp_path / "bag", None, tmp_path / "set", settings=settings, with_bag=False).summary
 

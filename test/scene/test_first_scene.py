@@ -99,7 +99,7 @@ SLIPS = [
         "what the chamber takes",
     ),
     ("rod: 125 mm", "rod: 125 mm, max_stroke: 4.5 m", "joints[0].max_stroke", "not the open length"),
-    ("-2750 mm]}", "-2750 mm], inclination: 3 rad}", "base.inclination", "degrees?"),
+    ("-2750 mm]}", "-2750 mm], inclination: 0.3 rad}", "base.inclination", "degrees?"),
 ]
 """A newcomer's slips in the table: what is there, what was written, where and with which words it is told; all load."""
 

@@ -63,6 +63,8 @@ CONTRADICTIONS = [
     ("joints[1].cylinder.max_stroke", GONE, "is absent", "the largest stroke, m"),
     ("joints[1].cylinder.k -> joints[1].cylinder.d", GONE, "90000.0", "incompressible", "Give k", "remove d"),
     ("joints[1].range_deg", [10, -165], "low < high", "lower angle first"),
+    ("joints[1].range_deg", [-2.88, 0.17], "within 6.28 degrees", "these radians would be [-165, 9.74]"),
+    ("base.inclination", 5.0, "not be more than 1.571", "in rad, or with its unit, like 5 deg"),
     ("postures.arch", [60, 20, -30], "it has 3 angles", "4 sections", "one angle per section"),
     ("joints[1].D", [-0.4, -0.04], "rigid head of sections[0]", "x >= -0.26", "x1 <= 3.46"),
     ("joints[1].E", [0.3, 0.062], "rigid root of sections[1]", "x <= 0.25", "x0 >= 0.3"),

@@ -157,6 +157,21 @@ def test_a_boom_at_rest_leaves_open_what_it_cannot_tell(rows: Rows, tmp_path: Pa
     assert "joint_3 not as declared" in line and f"boom_twin mapping --check {bag}" in line
 
 
+def test_info_says_of_a_table_what_it_lacks(rows: Rows, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Joint 3 has no sensor. Joint 4 reads degrees; then it has none either, and the boom is at rest."""
+    columns = [(rows.stamps - rows.stamps[0]) * 1e-9, *rows.strokes.T, *rows.joints.T[:2], np.degrees(rows.joints.T[3])]
+    names = ["t_s", *(f"stroke_{i}_m" for i in range(1, 5)), *(f"joint_{i}_rad" for i in (1, 2, 4))]
+    told = []
+    for used, count in ((8, None), (7, 100)):
+        path, table = tmp_path / f"{used}.csv", np.column_stack(columns[:used])[:count]
+        np.savetxt(path, table, delimiter=",", header=",".join(names[:used]), comments="")
+        assert main(["info", str(path)]) == 0
+        told.append(capsys.readouterr().out)
+    assert "joint_4: declared as `joint_4, rad`, found `joint_4, deg`" in told[0]
+    assert "joint_3 is in no message" in told[1] and "else as expected, as far as a boom at rest shows" in told[1]
+    assert "`boom_twin import` makes a session with both" in told[1] and "4 sections" in told[1]
+
+
 def test_a_session_of_another_boom_is_refused(rows: Rows, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     fewer = rows._replace(strokes=rows.strokes[:, :2], joints=rows.joints[:, :2])
     assert main(["mapping", "--check", str(written(fewer, tmp_path / "bag"))]) == 1

@@ -106,10 +106,7 @@ def _value(draft: Draft, place: Place, value: Any) -> Findings:
 
 def _narrow(draft: Draft, place: Place, value: tuple[float, float]) -> Findings:
     narrow = 25.0  # deg; joints of booms turn by 60 and more
-    if max(map(abs, value)) < 6.3:
-        shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in value)
-        yield draft.warning(place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
-    elif 0.0 < value[1] - value[0] < narrow:
+    if 0.0 < value[1] - value[0] < narrow:
         bound = f"{TURNS} {value[1] - value[0]:.3g} deg in all; expected at least {narrow:g} deg"
         yield draft.warning(place, value, bound, "Give the lowest and the highest joint angle in degrees; check the decimals.")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 from ...config.yaml_text import Place
@@ -160,12 +161,14 @@ def _oil_spring(draft: Draft, i: int, cylinder: Cylinder) -> Findings:
 
 
 def _range(draft: Draft, i: int, joint: Joint) -> Findings:
-    low, high = joint.range_deg
-    if not -360 <= low < high <= 360:
-        bound = "[low, high] must have -360 <= low < high <= 360 degrees"
-        yield draft.fault(
-            ("joints", i, "range_deg"), joint.range_deg, bound, "Give the lower angle first, both within one turn."
-        )
+    place, (low, high) = ("joints", i, "range_deg"), joint.range_deg
+    if not -360 <= low < high <= min(360, low + 360):
+        bound = "[low, high] must have -360 <= low < high <= 360 degrees, and high - low <= 360 degrees"
+        yield draft.fault(place, joint.range_deg, bound, "Give the lower angle first, both within one turn.")
+    elif max(abs(low), abs(high)) < 2.0 * math.pi:
+        shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in joint.range_deg)
+        bound = "both are within 6.28 degrees, and joints of booms turn further: radians?"
+        yield draft.fault(place, joint.range_deg, bound, f"Give degrees; these radians would be [{shown}].")
 
 
 def _several(number: int, noun: str) -> str:
