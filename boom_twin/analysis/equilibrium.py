@@ -12,7 +12,7 @@ from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError, UsageError
 from ..kernels.elements.linkage import link_angles
-from ..kernels.elements.pin_contact import APPROACH, CLOSED, DAMPER, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
+from ..kernels.elements.pin_contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
 from ..kernels.integrators import REST, X, prepare
 from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
@@ -66,11 +66,11 @@ def linearise_pins(plan: Plan, state: State) -> None:
         distance = float(np.hypot(*offset))
         memory[CLOSED] = float(distance > row.gap - NEAR)
         _, _, _, depth, _ = penetration(row, *offset)
+        memory[FORCE] = row.stiffness * depth**row.exponent
         if row.linear:
-            force = row.stiffness * depth**row.exponent
-            memory[SPRING] = row.exponent * force / depth
-            memory[DAMPER] = row.loss * force / SLOWEST
-            x, y = offset * (1.0 - force / (memory[SPRING] * distance))
+            memory[SPRING] = row.exponent * memory[FORCE] / depth
+            memory[DAMPER] = row.loss * memory[FORCE] / SLOWEST
+            x, y = offset * (1.0 - memory[FORCE] / (memory[SPRING] * distance))
             c, s = axis_of(plan.tables, state, row)
             memory[SEAT_X], memory[SEAT_Y] = c * x + s * y, c * y - s * x
 

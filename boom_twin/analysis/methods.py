@@ -36,6 +36,9 @@ from .simulate import RHO
 FAMILIES = {
     "generalised-alpha": integrators.GENERALISED_ALPHA,
     "newmark": integrators.NEWMARK,
+    "wilson": integrators.WILSON,
+    "houbolt": integrators.HOUBOLT,
+    "park": integrators.PARK,
 }
 
 Drive = Callable[[Array], tuple[Array, Array]]
@@ -47,10 +50,15 @@ class Method:
     """Integration method."""
 
     integrator: str = "generalised-alpha"  # key of `FAMILIES`
-    parameter: float = RHO  # rho of generalised-alpha, gamma of Newmark
+    parameter: float = RHO  # rho of generalised-alpha, gamma of Newmark, theta of Wilson; Houbolt and Park have none
     passes: int = int(PASSES)  # largest number of Newton passes in a step; 1 is the papers' linearised pass
     tolerance: float = STEP_TOLERANCE  # rad, see `kernels.transfer.time_step.advance`
     product: Literal["riccati", "plain"] = "riccati"  # plain: the papers' product of transfer matrices
+
+    @property
+    def reach(self) -> float:
+        """Time from the start of a step to the instant it solves for, in steps."""
+        return self.parameter if self.integrator == "wilson" else 1.0
 
 
 @dataclass(frozen=True)
@@ -91,12 +99,13 @@ def integrate_with(
         raise UsageError("product = 'plain': knows ideal pins only. Take riccati, or a scene without the block `clearance`.")
     if scene.base.stiffness is not None and method.product == "plain":
         raise UsageError("product = 'plain': knows a rigid base only. Take riccati, or a scene without base.stiffness.")
-    state, work, first = plan.state(), plan.work(), drive(np.zeros(1))[0][0]
+    depth, first = integrators.depth_of(FAMILIES[method.integrator]), drive(np.zeros(1))[0][0]
+    state, work = plan.state(depth), plan.work(depth)
     settle(plan, state, work, first, joint_angles_of_strokes(scene, first, near=angles))
     out = np.full((rows + 1, width_of(plan)), np.nan)
     out[0] = first_row(plan, state)
     product = new_product(plan.tables) if method.product == "plain" else None
-    strokes, rates = drive(np.asarray(step * (np.arange(rows * every) + 1.0), float))
+    strokes, rates = drive(np.asarray(step * (np.arange(rows * every) + method.reach), float))
     steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
     begun = time.process_time()
     status, row, passes, jolt, shake = run(

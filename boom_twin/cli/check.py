@@ -216,7 +216,7 @@ def _over_stroke(account: Account) -> list[str]:
 def _clearance_title(clearance: Clearance) -> str:
     law = clearance.contact
     given = f"restitution {law.restitution:g} (it really gives {law.given_restitution:.3f})"
-    words = f"{law.law} contact, {given}"
+    words = f"{law.law} contact, {given}, friction {law.friction:g}"
     linear = ", linearised at the preload" if clearance.treatment == "spring-damper" else ""
     return f"Pins with clearance ({words}{linear})"
 

@@ -117,12 +117,15 @@ class _Builder:
                 z=z,
                 owner=owner,
                 place=PLACES[place],
+                turn=self.layout.histories([0.0], [0.0]) if law.friction else -1,
                 heavy=heavy[place],
                 linear=block.treatment == "spring-damper",
                 gap=pin.radial_clearance,
                 stiffness=contact.contact_stiffness(pin.pin_radius, pin.radial_clearance, softness),
                 exponent=law.exponent,
                 loss=contact.LAWS[law.law](law.restitution),
+                friction=law.friction,
+                radius=pin.pin_radius,
             )
         return first
 

@@ -85,17 +85,17 @@ class Plan:
             compliances[i], lags[i] = compliance_and_lag(cylinders[i], oils, drives[i])
         return compliances, lags
 
-    def state(self) -> State:
-        """A fresh state, all zero."""
+    def state(self, depth: int = DEPTH) -> State:
+        """A fresh state, all zero; `depth` rows of history."""
         histories, n = len(self.masses), self.joints
         return State(
-            z=np.zeros(len(self.names)), history=np.zeros((DEPTH, histories)),
+            z=np.zeros(len(self.names)), history=np.zeros((depth, histories)),
             frames=np.zeros((len(self.tables.operations) + 1, 5)), turns=np.zeros((n, 8)), pins=np.zeros((n, 4)),
             contacts=np.zeros((len(self.pins), contact.COLUMNS)), drives=np.zeros((2, n)), pace=np.zeros(1, np.int64),
         )  # fmt: skip
 
-    def work(self) -> Work:
-        """Scratch arrays of the right sizes."""
+    def work(self, depth: int = DEPTH) -> Work:
+        """Scratch arrays of the right sizes, for schemes of `depth`."""
         t, histories = self.tables, len(self.masses)
         points, shapes = max(t.psi.shape[1], 1), t.psi.shape[2] + 1
         beams, operations, n, pins = len(t.beams), len(t.operations), self.joints, len(self.pins)
@@ -109,8 +109,8 @@ class Plan:
         )  # fmt: skip
         return Work(
             position=np.zeros(histories), velocity=np.zeros(histories), acceleration=np.zeros(histories),
-            hat=np.zeros(histories), offset=np.zeros(histories), weights=new_weights(),
-            finer=new_weights(), s=np.zeros((SLOTS, SLOTS)), p=np.zeros(SLOTS), g=np.zeros(LOOP), h=np.zeros((LOOP, LOOP)),
+            hat=np.zeros(histories), offset=np.zeros(histories), weights=new_weights(depth),
+            finer=new_weights(depth), s=np.zeros((SLOTS, SLOTS)), p=np.zeros(SLOTS), g=np.zeros(LOOP), h=np.zeros((LOOP, LOOP)),
             own_g=np.zeros(5), own_h=np.zeros((5, 5)), right=np.zeros((inner, SLOTS)),
             condensed=condensed, hold=np.zeros((pins, contact.HOLD_COLUMNS)),
             apart=np.zeros((2, LOOP + 1)), rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)),

@@ -135,7 +135,7 @@ class State(NamedTuple):
     """State of the boom between steps."""
 
     z: Array  # (unknowns,), coordinates and forces, see the tables
-    history: Array  # (DEPTH, histories), of unknowns, then mass points; rows: see `kernels.integrators`
+    history: Array  # (depth, histories), of unknowns, then mass points; rows: see `kernels.integrators`
     frames: Array  # (operations + 1, 5), x, y, theta, cos, sin before every operation, and at the tip
     turns: Array  # (joints, 8), cosine and sine of a joint's head, and of a six-bar's section, link L, link R
     pins: Array  # (cylinders, 4), ends C and R of every cylinder, m

@@ -242,9 +242,7 @@ class ContactLaw(Part):
     law: LawName = Field(default="lankarani-nikravesh", description=f"{', '.join(_LAWS[:-1])} or {_LAWS[-1]}")
     exponent: float = Field(default=1.5, ge=1.3, le=3, description="the exponent of the penetration, 1.3 to 3; 1.5 for Hertz's")
     restitution: float = Field(default=0.9, gt=0, le=1, description="the coefficient of restitution, above 0 and at most 1")
-    friction: float = Field(
-        default=0.0, ge=0, le=0, description="0: pins have no friction; the key is in scenes of earlier versions"
-    )
+    friction: float = Field(default=0.0, ge=0, le=2, description="Coulomb's coefficient of friction, 0 to 2")
     bush: Material | None = Field(
         default=None, description="a block with E (Pa) and nu of the bush, if it is not of the boom's material"
     )
@@ -269,7 +267,7 @@ class Clearance(Part):
     """Pins that are not ideal: real contact, or springs and dampers linearised at their preload."""
 
     treatment: Literal["contact", "spring-damper"] = Field(default="contact", description="contact or spring-damper")
-    contact: ContactLaw = Field(default=ContactLaw(), description="a block with law, exponent, restitution")
+    contact: ContactLaw = Field(default=ContactLaw(), description="a block with law, exponent, restitution, friction")
     pins: tuple[Pin, ...] = Field(default=(), description="a list with one block per pin")
 
 

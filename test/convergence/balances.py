@@ -15,6 +15,7 @@ Of energy it includes the numerical damping of generalised-alpha.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -25,11 +26,15 @@ from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE, DriveCourse
 from boom_twin.compiler.plan import Plan
 from boom_twin.kernels.elements.cylinder import END_C
 from boom_twin.kernels.elements.pin_contact import (
+    BARREL_END_PIN,
     CLEARANCE,
     DAMPER,
+    FORCE,
     LEAST_SHARE,
+    PIVOT,
     SEAT_X,
     SEAT_Y,
+    SLIP,
     SMOOTH,
     SPRING,
     approach,
@@ -37,7 +42,7 @@ from boom_twin.kernels.elements.pin_contact import (
 )
 from boom_twin.kernels.integrators import GENERALISED_ALPHA, A, V, X, prepare
 from boom_twin.kernels.tables import OK, SENTENCES, Motion, State, Work
-from boom_twin.kernels.transfer.clearance_pins import axis_of, load_pins
+from boom_twin.kernels.transfer.clearance_pins import axis_of, load_pins, torque_of
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.riccati_sweep import FREE, clear_cut, sweep_in
 from boom_twin.kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
@@ -133,7 +138,7 @@ class Energies:
         return float(own @ self._damping @ own + self._oil(state.drives[0])[1] @ slip**2)
 
     def contact_power(self, state: State) -> float:
-        """Power that contacts take, by restitution, W; of linearised pins, their dampers."""
+        """Power that contacts take, by restitution and friction, W; of linearised pins, their dampers."""
         rates, total = state.history[V], 0.0
         for row, memory in zip(self._pins, state.contacts, strict=True):
             x, y, vx, vy = state.z[row.z], state.z[row.z + 1], rates[row.z], rates[row.z + 1]
@@ -144,6 +149,9 @@ class Energies:
             approaching = nx * vx + ny * vy
             share = max(1.0 + row.loss * approaching / approach(memory, nx, ny, vx, vy), LEAST_SHARE)
             total += row.stiffness * d**row.exponent * (share - 1.0) * approaching
+            if row.friction > 0.0:
+                slip = nx * vy - ny * vx + row.radius * rates[row.turn]
+                total += row.friction * memory[FORCE] * slip * slip / math.hypot(slip, SLIP)
         return float(total)
 
 
@@ -247,7 +255,7 @@ class Momenta:
         return float(joint.x), float(joint.y)
 
     def _base(self, state: State, load: Array) -> Array:
-        """Return force and moment of the base: at the pivot and the barrel pin of cylinder 1."""
+        """Return force and moment of the base: at the pivot and the barrel pin of cylinder 1, with friction torques there."""
         t, work = self._plan.tables, self._work
         place(t, state, work)
         motion = Motion(1.0, 0.0, work.position - state.history[A], state.history[V].copy())
@@ -257,7 +265,8 @@ class Momenta:
         drive, rate, last = state.drives[0], state.drives[1], np.int64(len(t.operations))
         sweep_in(t, state, work, motion, drive, rate, BEHIND_PIVOT, last, FREE)
         barrel, pin = work.own_g[END_C : END_C + 2], state.pins[0, END_C : END_C + 2] - self._pivot
-        moment = pin[0] * barrel[1] - pin[1] * barrel[0]
+        friction = torque_of(t, work, t.joints[0], PIVOT) + torque_of(t, work, t.cylinders[0], BARREL_END_PIN)
+        moment = pin[0] * barrel[1] - pin[1] * barrel[0] - friction
         return np.array([work.p[0] + barrel[0], work.p[1] + barrel[1], moment])
 
 

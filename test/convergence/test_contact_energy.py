@@ -71,3 +71,10 @@ def test_energy_never_exceeds_the_first(law, restitution, step):
 def test_elastic_contact_loses_little_where_it_is_resolved():
     _, left, _ = Closed(booms_with("hertz", 1.0), 1e-4).watch(3000, 10)
     assert 0.999 < left < 1.0 + 1e-6
+
+
+def test_friction_only_takes():
+    _, without, _ = Closed(booms_with("lankarani-nikravesh", 0.9), 1e-3).watch(500, 10)
+    rise, left, _ = Closed(booms_with("lankarani-nikravesh", 0.9, friction=0.1), 1e-3).watch(500, 10)
+    assert rise < 1e-3 and left < without
+    assert np.isfinite(left)

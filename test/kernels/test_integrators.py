@@ -5,14 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.kernels.integrators import GENERALISED_ALPHA, NEWMARK, A, P, V, X, finish_step, new_weights, prepare, start_step
+from boom_twin.kernels.integrators import (
+    GENERALISED_ALPHA,
+    HOUBOLT,
+    NEWMARK,
+    PARK,
+    WILSON,
+    A,
+    P,
+    V,
+    X,
+    depth_of,
+    finish_step,
+    new_weights,
+    prepare,
+    start_step,
+)
 
 RHOS = [0.0, 0.3, 0.8, 1.0]
-SCHEMES = [(GENERALISED_ALPHA, rho) for rho in RHOS] + [(NEWMARK, 0.5)]
+SCHEMES = [(GENERALISED_ALPHA, rho) for rho in RHOS] + [(NEWMARK, 0.5), (WILSON, 1.4), (HOUBOLT, 0.0), (PARK, 0.0)]
 
 
 def scheme_of(family, parameter, step):
-    return prepare(family, parameter, step, new_weights())
+    return prepare(family, parameter, step, new_weights(depth_of(family)))
 
 
 def published(rho):
@@ -43,16 +58,31 @@ def stepped(scheme, history, new):
     return new
 
 
-def test_newmark_follows_a_parabola_without_error():
-    h, history = 0.1, np.array([[0.3], [0.7], [-2.2], [-2.2]])
-    stepped(scheme_of(NEWMARK, 0.5, h), history, np.array([0.3 + 0.7 * h - 1.1 * h * h]))
-    assert history[[V, A], 0] == pytest.approx([0.7 - 2.2 * h, -2.2], abs=1e-12)
+@pytest.mark.parametrize("family", [NEWMARK, WILSON, HOUBOLT, PARK])
+def test_motion_that_a_scheme_reproduces(family):
+    """A parabola is followed without error: x, v, a at the new time, from exact values at the old ones."""
+    h, parameter = 0.1, {NEWMARK: 0.5, WILSON: 1.4}.get(family, 0.0)
+    s, depth = scheme_of(family, parameter, h), depth_of(family)
+
+    def x(t):
+        return 0.3 + 0.7 * t - 1.1 * t * t
+
+    def v(t):
+        return 0.7 - 2.2 * t
+
+    rows = [x(-2 * h), v(-2 * h), x(-h), v(-h), x(0), v(0), -2.2, -2.2]
+    history = np.array(rows[-depth:])[:, None]
+    stepped(s, history, np.array([x(s.reach)]))
+    assert history[[X, V, A], 0] == pytest.approx([x(h), v(h), -2.2], abs=1e-12)
+    if depth == 8:
+        assert history[:4, 0] == pytest.approx([x(-h), v(-h), x(0), v(0)], abs=1e-12)
 
 
 def oscillator(family, parameter, step, omega=6.0, zeta=0.05, duration=1.0):
-    """x'' + 2 zeta omega x' + omega^2 x = 0 from x = 1 at rest: final x, v, a."""
-    s, (x, v, a) = scheme_of(family, parameter, step), solution(0.0)
-    history = np.array([[x], [v], [a], [a]])
+    """x'' + 2 zeta omega x' + omega^2 x = 0 from x = 1 at rest: final x, v, a. Earlier values are the exact ones."""
+    s = scheme_of(family, parameter, step)
+    exact = np.array([solution(-2 * step), solution(-step), solution(0.0)])
+    history = np.append(exact[:, :2].ravel(), [exact[-1, 2], exact[-1, 2]])[-depth_of(family) :, None]
     hat, offset, v, a = np.zeros((4, 1))
     for _ in range(round(duration / step)):
         start_step(s, history, hat, offset)

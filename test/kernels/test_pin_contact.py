@@ -1,4 +1,4 @@
-"""The force of a pin in its bush: restitution, tangents, memory."""
+"""The force of a pin in its bush: restitution, tangents, friction, memory."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from oracle import booms
 from oracle.clearance import drop
 from oracle.clearance.drop import PUBLISHED, restitution
 from oracle.clearance.scenes import RODS, with_pins
-from reference.contact_law import HYSTERESIS, Contact
 from scipy.integrate import solve_ivp
 
 from boom_twin.kernels.elements import pin_contact as contact
 from boom_twin.kernels.elements.pin_contact import APPROACH, CLOSED, COLUMNS, LAWS, SMOOTH, restitution_of
+from boom_twin.validation.contact_law import HYSTERESIS, Contact
 
 WITHIN = 0.005  # of a coefficient of restitution
 rng = np.random.default_rng(4)
 MASS = 20.0  # kg
 
 
-def compiled(law="lankarani-nikravesh", restitution=0.9):
+def compiled(law="lankarani-nikravesh", restitution=0.9, friction=0.0):
     """A row of the compiled table, and a memory that has seen nothing."""
-    plan = compile_scene(with_pins(booms.document(), RODS[:1], law=law, restitution=restitution))
+    plan = compile_scene(with_pins(booms.document(), RODS[:1], law=law, restitution=restitution, friction=friction))
     return plan.tables.clearances[0], np.zeros(COLUMNS)
 
 
-def force(pin, memory, place, velocity=(0.0, 0.0)):
-    return np.array(bearing(pin, memory, *place, *velocity))
+def force(pin, memory, place, velocity=(0.0, 0.0), turning=0.0):
+    return np.array(bearing(pin, memory, *place, *velocity, turning))
 
 
 def kept(law, restitution, speed):
@@ -115,10 +115,24 @@ def test_the_elastic_force_has_a_potential_that_is_convex():
         return pin.stiffness * (depth ** (n + 1.0) / (n + 1.0) + 0.25 * d * d * depth ** (n - 1.0) / (n - 1.0))
 
     for x, y, _, _ in places():
-        fx, fy, kxx, kxy, kyy = bearing(pin, memory(0.1), x, y, 0.0, 0.0)
+        fx, fy, kxx, kxy, kyy, *_ = bearing(pin, memory(0.1), x, y, 0.0, 0.0)
         slope = (energy(x + 1e-9, y) - energy(x - 1e-9, y)) / 2e-9, (energy(x, y + 1e-9) - energy(x, y - 1e-9)) / 2e-9
         assert slope == pytest.approx([fx, fy], rel=1e-4, abs=1e-4)
         assert np.linalg.eigvalsh([[kxx, kxy], [kxy, kyy]])[0] > 0.0
+
+
+@pytest.mark.parametrize("turning", [0.0, 0.4, -3.0])
+def test_friction_takes_energy_and_its_tangent_is_symmetric_and_positive(turning):
+    smooth, rough, rate = row(), row(friction=0.2), 2000.0
+    for x, y, vx, vy in places():
+        kept = memory(0.05, force=5e3)
+        a, b = (np.array(bearing(pin, kept, x, y, vx, vy, turning, rate)) for pin in (smooth, rough))
+        fx, fy, kxx, kxy, kyy, torque, kx, ky, turn = b - a
+        assert fx * vx + fy * vy + torque * turning >= 0.0
+        assert np.hypot(fx, fy) <= 0.2 * 5e3 * (1.0 + 1e-9)
+        assert torque == pytest.approx(np.copysign(np.hypot(fx, fy) * rough.radius, torque), rel=1e-3)
+        values = np.linalg.eigvalsh([[kxx, kxy, kx], [kxy, kyy, ky], [kx, ky, turn]])
+        assert values[0] > -1e-6 * values[-1] and values[-1] > 0.0
 
 
 def test_the_linearised_pin_is_a_spring_and_damper_that_turns_with_its_body():
@@ -126,24 +140,24 @@ def test_the_linearised_pin_is_a_spring_and_damper_that_turns_with_its_body():
     kept[contact.SPRING], kept[contact.DAMPER], kept[contact.SEAT_X], kept[contact.SEAT_Y] = 3e8, 2e4, 7e-5, -2e-5
     turn = np.exp(0.3j)
     offset, rate, seat = 9e-5 + 4e-5j, 0.01 - 0.02j, complex(7e-5, -2e-5)
-    fx, fy, kxx, kxy, kyy = bearing(
+    fx, fy, kxx, kxy, kyy, *rest = bearing(
         row(), kept, offset.real, offset.imag, rate.real, rate.imag, rate=500.0, axis=(turn.real, turn.imag)
     )
     assert complex(fx, fy) == pytest.approx(3e8 * (offset - turn * seat) + 2e4 * rate)
-    assert (kxx, kxy, kyy) == (3e8 + 500.0 * 2e4, 0.0, 3e8 + 500.0 * 2e4)
+    assert (kxx, kxy, kyy) == (3e8 + 500.0 * 2e4, 0.0, 3e8 + 500.0 * 2e4) and not any(rest)
 
 
 def test_what_a_pin_remembers():
     """The speed of approach when contact begins, at least SLOWEST, until contact is lost, which is counted."""
     pin, kept, rim = row(), memory(), row().gap
-    contact.remember(pin, kept, rim - 2.0 * contact.NEAR, 0.0, 0.3, 0.0)
+    contact.remember(pin, kept, rim - 2.0 * contact.NEAR, 0.0, 0.3, 0.0, 0.0, 0.0)
     assert kept[contact.CLOSED] == 0.0
-    contact.remember(pin, kept, rim, 0.0, 0.3, 0.4)
-    assert kept[contact.CLOSED] == 1.0
+    contact.remember(pin, kept, rim, 0.0, 0.3, 0.4, 50.0, 7.0)
+    assert (kept[contact.CLOSED], kept[contact.FORCE]) == (1.0, pytest.approx(50.0, rel=1e-3))
     assert kept[contact.APPROACH] == pytest.approx(0.3, rel=1e-3)
-    contact.remember(pin, kept, rim + 1e-5, 0.0, 0.1, 0.0)
+    contact.remember(pin, kept, rim + 1e-5, 0.0, 0.1, 0.0, 50.0, 0.0)
     assert kept[contact.APPROACH] == pytest.approx(0.3, rel=1e-3) and kept[contact.LOST] == 0.0
-    contact.remember(pin, kept, 0.0, 0.0, -0.1, 0.0)
+    contact.remember(pin, kept, 0.0, 0.0, -0.1, 0.0, 0.0, 0.0)
     assert (kept[contact.CLOSED], kept[contact.LOST]) == (0.0, 1.0)
-    contact.remember(pin, kept, rim, 0.0, 1e-5, 0.0)
+    contact.remember(pin, kept, rim, 0.0, 1e-5, 0.0, 0.0, 0.0)
     assert kept[contact.APPROACH] == contact.SLOWEST

@@ -20,7 +20,7 @@ from boom_twin.scene.schema import Clearance, ContactLaw, Pin
 scene, count, pins = load_scene(), int(sys.argv[1]), sys.argv[2:]
 if pins:
     worn = [Pin(at=at, pin_radius=0.025, radial_clearance=1e-4) for at in pins]
-    scene = scene.model_copy(update={"clearance": Clearance(pins=worn)})
+    scene = scene.model_copy(update={"clearance": Clearance(contact=ContactLaw(friction=0.1), pins=worn)})
 found = statics(scene, posture="arch", modes=1)
 times = 2e-3 * np.arange(count + 1)
 strokes = found.strokes + np.outer(times**2, [8.0, -4.0, 6.0, 4.0])

@@ -9,7 +9,7 @@ import numpy as np
 from compiled import RHO, Plan, compile_scene, set_undeformed, taken_apart
 
 from boom_twin.analysis.drive import PASSES
-from boom_twin.kernels.integrators import AUXILIARY, GENERALISED_ALPHA, HAT, NEW_A, Scheme, X, new_weights
+from boom_twin.kernels.integrators import DEPTH, GENERALISED_ALPHA, HAT, NEW_A, A, P, Scheme, X, new_weights
 from boom_twin.kernels.tables import State, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.time_step import advance
@@ -43,8 +43,8 @@ def released(scene, angles):
     set_undeformed(plan, state, np.asarray(angles, dtype=float))
     place(plan.tables, state, work)
     state.history[X] = begin = work.position.copy()
-    weights = new_weights()
-    weights[HAT, X] = weights[AUXILIARY, NEW_A] = 1.0
+    weights = new_weights(DEPTH)
+    weights[HAT, X] = weights[P, NEW_A] = weights[A, NEW_A] = 1.0
     instant = Scheme(np.int64(GENERALISED_ALPHA), 0.0, 0.0, 2.0 / INSTANT**2, 0.0, weights)
     still = np.zeros(plan.joints)
     status, _, _ = advance(plan.tables, state, work, instant, start.lengths, still, TOLERANCE, PASSES, 1.0, None, False)

@@ -12,6 +12,9 @@ chi, a function of the coefficient of restitution. The bracket is at least `LEAS
 position of a massless journal stays determined when it leaves. With g' in the bracket the rebound does not depend on the
 smoothing of d. The elastic energy is convex in delta, so a pin at rest has one position.
 
+Friction opposes the surfaces' slip velocity w = n x delta' + R_i (angular velocity of the journal in the bush). It is
+mu F w/sqrt(w^2 + w_s^2). F is that of the step before, which keeps the tangent symmetric.
+
 The linearised pin at preload F_0 with penetration d_0 is a spring k = e F_0/d_0 and a damper chi F_0/v. Force F_0 stretches
 the spring from its seat to c + d_0. The seat is fixed to the cylinder, or to the body with the bush of a pivot or link pin. It
 therefore turns with the cylinder's force, and stays on its side if the force reverses.
@@ -32,6 +35,7 @@ NEAR = 4.0 * SMOOTH  # m, gap below which journal and bush count as touching
 LEAST_GAP = 3e-5  # m, least difference of radii in K
 LEAST_SHARE = 0.01  # least contact force as a fraction of the elastic force
 SLOWEST = 1e-3  # m/s, least speed of approach
+SLIP = 1e-3  # m/s, slip at which friction has 0.7 of its full size
 
 # Kinds of pins. They are typed because numba compiles again for every literal.
 PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD_END_PIN, BARREL_END_PIN = map(np.int64, range(6))
@@ -46,40 +50,48 @@ class Journal(NamedTuple):
     vy: float
     before_x: float  # velocity at the start of the step, m/s
     before_y: float
+    turning: float  # angular velocity of the journal in the bush, rad/s
     axis_x: float  # first axis of the body with the seat
     axis_y: float
 
 
 class PinForce(NamedTuple):
-    """Force on a journal, and its derivatives."""
+    """Contact force and friction torque on a journal, and their derivatives."""
 
     x: float  # force, N
     y: float
     xx: float  # tangent by the offset, N/m, as the next two
     xy: float
     yy: float
+    torque: float  # of friction, N m
+    torque_x: float  # derivatives of the torque by offset, N
+    torque_y: float
+    torque_turn: float  # by angle, N m
 
 
 # Columns of `Work.hold`, a `PinForce` for every pin.
-HOLD_X, HOLD_Y, K_XX, K_XY, K_YY, HOLD_COLUMNS = range(6)
+HOLD_X, HOLD_Y, K_XX, K_XY, K_YY, TORQUE, TORQUE_X, TORQUE_Y, TORQUE_TURN, HOLD_COLUMNS = range(10)
 
 CLEARANCE = np.dtype(
     [
         ("z", np.int64),  # index of delta in the unknowns
         ("owner", np.int64),  # row of its joint and cylinder
         ("place", np.int64),  # kind of pin, `PIVOT` to `BARREL_END_PIN`
+        ("turn", np.int64),  # index of the journal's angle in the histories, with friction only
         ("heavy", np.int64),  # 1 if the journal has inertia of its own
         ("linear", np.int64),  # 1: linearised at the preload of the first equilibrium
         ("gap", float),  # radial clearance c, m
         ("stiffness", float),  # K, N/m^e
         ("exponent", float),  # e
         ("loss", float),  # chi
+        ("friction", float),  # mu
+        ("radius", float),  # R_i, m
     ]
 )
 
-# Memory of a pin: touches (1) or not (0), speed of approach (m/s). Linearisation: spring (N/m; 0 for
+# Memory of a pin: touches (1) or not (0), speed of approach (m/s), normal force (N). Linearisation: spring (N/m; 0 for
 # contact), damper (N s/m), seat (m, in the axes of its body). Number of lost contacts.
-CLOSED, APPROACH, SPRING, DAMPER, SEAT_X, SEAT_Y, LOST, COLUMNS = range(8)
+CLOSED, APPROACH, FORCE, SPRING, DAMPER, SEAT_X, SEAT_Y, LOST, COLUMNS = range(9)
 
 
 def hunt_crossley_exact(restitution: float) -> float:
@@ -162,7 +174,7 @@ def pin_force(row, memory, journal, rate):
         fx = k * (x - ax * memory[SEAT_X] + ay * memory[SEAT_Y]) + c * vx
         fy = k * (y - ay * memory[SEAT_X] - ax * memory[SEAT_Y]) + c * vy
         stiff = k + rate * c
-        return PinForce(x=fx, y=fy, xx=stiff, xy=0.0, yy=stiff)
+        return PinForce(x=fx, y=fy, xx=stiff, xy=0.0, yy=stiff, torque=0.0, torque_x=0.0, torque_y=0.0, torque_turn=0.0)
     nx, ny, r, d, slope = penetration(row, x, y)
     speed = approach(memory, nx, ny, journal.before_x, journal.before_y)
     elastic = row.stiffness * (d * math.sqrt(d) if row.exponent == 1.5 else d**row.exponent)
@@ -173,10 +185,20 @@ def pin_force(row, memory, journal, rate):
     force = elastic * share
     radial = row.exponent * elastic / d * slope * share + elastic * lead * rate
     across = force / r
-    rest = across * (1.0 - nx * nx - ny * ny)
-    kxx = radial * nx * nx + across * ny * ny + rest
-    kyy = radial * ny * ny + across * nx * nx + rest
-    return PinForce(x=force * nx, y=force * ny, xx=kxx, xy=(radial - across) * nx * ny, yy=kyy)
+    drag, drag_rate = 0.0, 0.0
+    if row.friction > 0.0:
+        slip = nx * vy - ny * vx + row.radius * journal.turning
+        width = math.sqrt(slip * slip + SLIP * SLIP)
+        most = row.friction * memory[FORCE]
+        drag, drag_rate = most * slip / width, 0.5 * most / width * (1.0 + (SLIP / width) ** 2) * rate
+    along, rest, turn = across + drag_rate, across * (1.0 - nx * nx - ny * ny), row.radius * drag_rate
+    kxx = radial * nx * nx + along * ny * ny + rest
+    kyy = radial * ny * ny + along * nx * nx + rest
+    kxy = (radial - along) * nx * ny
+    return PinForce(
+        x=force * nx - drag * ny, y=force * ny + drag * nx, xx=kxx, xy=kxy, yy=kyy,
+        torque=row.radius * drag, torque_x=-turn * ny, torque_y=turn * nx, torque_turn=row.radius * turn,
+    )  # fmt: skip
 
 
 @inner
@@ -195,8 +217,8 @@ def limited(row, x, y, dx, dy):
 
 
 @inner
-def remember(row, memory, x, y, before_x, before_y):
-    """Store the start or end of contact in an accepted step."""
+def remember(row, memory, x, y, before_x, before_y, fx, fy):
+    """Store the start or end of contact in an accepted step, and the normal force."""
     nx, ny, r, _, _ = penetration(row, x, y)
     closed = r - row.gap > -NEAR
     if closed and memory[CLOSED] == 0.0:
@@ -205,3 +227,4 @@ def remember(row, memory, x, y, before_x, before_y):
     elif not closed and memory[CLOSED] > 0.0:
         memory[CLOSED] = 0.0
         memory[LOST] += 1.0
+    memory[FORCE] = max(0.0, nx * fx + ny * fy)

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from ..elements.cylinder import END_C, END_R
+from ..elements.cylinder import AXIAL, END_C, END_R
 from ..elements.pin_contact import (
     BARREL_END_PIN,
     CLOSED,
@@ -27,9 +27,14 @@ from ..elements.pin_contact import (
     LINK_L_PIN,
     LINK_R_PIN,
     NEAR,
+    PIVOT,
     Q_PIN,
     ROD_END_PIN,
     SPRING,
+    TORQUE,
+    TORQUE_TURN,
+    TORQUE_X,
+    TORQUE_Y,
     Journal,
     limited,
     pin_force,
@@ -62,22 +67,37 @@ def offset_of(t, z, owner, place):
 
 
 @inner
-def force_of_pin(t, state, k, rate, offset):
-    """Return the `PinForce` of pin `k`, whose velocities are v = rate x + offset."""
+def set_turn(t, work, owner, place, angle):
+    """Note the journal's angle in the bush (rad) of the pin `place`, if it has friction."""
+    for k in range(owner.first_clearance, owner.first_clearance + owner.clearances):
+        row = t.clearances[k]
+        if row.place == place and row.friction > 0.0:
+            work.position[row.turn] = angle
+
+
+@inner
+def force_of_pin(t, state, k, position, rate, offset):
+    """Return the `PinForce` of pin `k`, whose velocities are v = rate x + offset; `position` has the angles of journals."""
     row, before = t.clearances[k], state.history[V]
-    x, y = state.z[row.z], state.z[row.z + 1]
+    x, y, turning = state.z[row.z], state.z[row.z + 1], 0.0
     vx, vy = rate * x + offset[row.z], rate * y + offset[row.z + 1]
+    if row.friction > 0.0:
+        turning = rate * position[row.turn] + offset[row.turn]
     ax, ay = axis_of(t, state, row)
-    journal = Journal(x=x, y=y, vx=vx, vy=vy, before_x=before[row.z], before_y=before[row.z + 1], axis_x=ax, axis_y=ay)
+    journal = Journal(
+        x=x, y=y, vx=vx, vy=vy, before_x=before[row.z], before_y=before[row.z + 1], turning=turning, axis_x=ax, axis_y=ay
+    )
     return pin_force(row, state.contacts[k], journal, rate)
 
 
 @inner
 def load_pins(t, state, work, motion):
-    """Force and tangent of every pin with clearance into `work.hold`."""
+    """Force, tangent and torque of every pin with clearance into `work.hold`."""
     for k in range(t.clearances.shape[0]):
-        hold, found = work.hold[k], force_of_pin(t, state, k, motion.rate, motion.offset)
+        hold, found = work.hold[k], force_of_pin(t, state, k, work.position, motion.rate, motion.offset)
         hold[HOLD_X], hold[HOLD_Y], hold[K_XX], hold[K_XY], hold[K_YY] = found.x, found.y, found.xx, found.xy, found.yy
+        hold[TORQUE], hold[TORQUE_X], hold[TORQUE_Y] = found.torque, found.torque_x, found.torque_y
+        hold[TORQUE_TURN] = found.torque_turn
 
 
 @inner
@@ -94,6 +114,27 @@ def axis_of(t, state, row):
     if row.place == Q_PIN:
         return turns[LINK_L_TURN], turns[LINK_L_TURN + 1]
     return turns[HEAD_TURN], turns[HEAD_TURN + 1]
+
+
+@inner
+def add_turning(hold, h, at, journal, bush):
+    """Tangent of friction's torque between two bodies, whose angles stand at `journal` and `bush`, the offset at `at`."""
+    low, high = min(journal, bush), max(journal, bush)
+    h[journal, journal] += hold[TORQUE_TURN]
+    h[bush, bush] += hold[TORQUE_TURN]
+    h[high, low] -= hold[TORQUE_TURN]
+    for i in range(2):
+        h[at + i, journal] += hold[TORQUE_X + i]
+        h[at + i, bush] -= hold[TORQUE_X + i]
+
+
+@inner
+def torque_of(t, work, owner, place):
+    """Torque (N m) with which friction holds the journal of the pin `place`; zero without."""
+    for k in range(owner.first_clearance, owner.first_clearance + owner.clearances):
+        if t.clearances[k].place == place:
+            return work.hold[k, TORQUE]
+    return 0.0
 
 
 @inner
@@ -115,6 +156,11 @@ def condense_ends(t, state, work, cylinder, g, h):
     g - H_ye free and H - H_ye gains, as in `six_bar`. A second end is condensed from what the first one left, where the first
     is a pin and the second still an end; `move_ends` therefore goes back from the last to the first.
     """
+    torque = 0.0
+    for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
+        torque += work.hold[k, TORQUE]
+    if torque != 0.0:
+        _turn_back(g, h, torque / work.position[cylinder.history])
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
         at, hold, block = end_of(t.clearances[k]), work.hold[k], work.condensed.ends[k]
         gains, free = work.condensed.end_gains[k], work.condensed.end_free[k]
@@ -131,6 +177,23 @@ def condense_ends(t, state, work, cylinder, g, h):
             g[i] -= to_x * free[0] + to_y * free[1]
             for j in range(5):
                 h[i, j] -= to_x * gains[0, j] + to_y * gains[1, j]
+
+
+@inner
+def _turn_back(g, h, force):
+    """Friction's torque on a cylinder, as a couple of forces (N) on its ends, `force` = torque over length.
+
+    The torque M works on the cylinder's angle gamma. With e the axis, n = (-e_y, e_x) and d = R - C of length l,
+    dgamma = n.(dR - dC)/l, so the gradient by R is M/l n, and by C its opposite. The axis is read from the row of the
+    cylinder's law: its derivative by R is e over a positive number, which the norm takes out. Its tangent is left out.
+    """
+    along_x, along_y = h[AXIAL, END_R].real, h[AXIAL, END_R + 1].real  # real by itself also in a frequency response
+    share = force / math.hypot(along_x, along_y)
+    ex, ey = share * along_x, share * along_y
+    g[END_C] += ey
+    g[END_C + 1] -= ex
+    g[END_R] -= ey
+    g[END_R + 1] += ex
 
 
 @inner
@@ -158,13 +221,13 @@ def shorten(t, state, work):
 
 
 @inner
-def note_contacts(t, state):
+def note_contacts(t, state, work):
     """Let all pins remember the step that ends; before the histories are written."""
     before = state.history[V]
     for k in range(t.clearances.shape[0]):
-        row = t.clearances[k]
-        i, j = row.z, row.z + 1
-        remember(row, state.contacts[k], state.z[i], state.z[j], before[i], before[j])
+        row, hold = t.clearances[k], work.hold[k]
+        x, y = state.z[row.z], state.z[row.z + 1]
+        remember(row, state.contacts[k], x, y, before[row.z], before[row.z + 1], hold[HOLD_X], hold[HOLD_Y])
 
 
 @inner
@@ -247,7 +310,7 @@ def take_rows(t, work, joint, place, size, g, h):
 
 @inner
 def free_pins(t, state, work, joint, g, h):
-    """Closure of pin Q with all offsets, and the force of pin Q's own."""
+    """Closure of pin Q with all offsets, the force of pin Q's own, and friction in all four pins."""
     lx, ly = state.z[joint.z + Z_LAMBDA], state.z[joint.z + Z_LAMBDA + 1]
     for k in range(joint.clearances):
         row = joint.first_clearance + k
@@ -265,3 +328,8 @@ def free_pins(t, state, work, joint, g, h):
                 g[at + i] += hold[HOLD_X + i]
                 for j in range(i + 1):
                     h[at + i, at + j] += hold[K_XX + i + j]
+        journal = SECTION if place == PIVOT else ALPHA_L if place == LINK_L_PIN else ALPHA_R
+        bush = SECTION if place == LINK_R_PIN else ALPHA_L if place == Q_PIN else HEAD
+        g[journal] += hold[TORQUE]
+        g[bush] -= hold[TORQUE]
+        add_turning(hold, h, at, journal, bush)

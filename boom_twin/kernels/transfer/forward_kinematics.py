@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from ..elements.beam import BeamPart, Sizes, place_beam
-from ..elements.cylinder import END_C, END_R, place_cylinder
+from ..elements.cylinder import END_C, END_R, near, place_cylinder
 from ..elements.linkage import LINK_L
-from ..elements.pin_contact import BARREL_END_PIN, LINK_L_PIN, LINK_R_PIN, PIVOT, ROD_END_PIN
+from ..elements.pin_contact import BARREL_END_PIN, LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD_END_PIN
 from ..integrators import X
 from ..jit import inner, kernel
 from ..plane_algebra import COS, SIN, cosine_and_sine, rotated
@@ -30,7 +32,7 @@ from ..tables import (
     Z_LINK_R,
     Z_SECTION,
 )
-from .clearance_pins import offset_of
+from .clearance_pins import offset_of, set_turn
 
 
 @inner
@@ -55,8 +57,8 @@ def origin_of(t, z, joint, side, x, y):
 
 
 @inner
-def place_linkage(t, state, work, index, x, y, c, s):
-    """Links and cylinder of joint B `index` (row of all joint tables); pivot at (x, y), cosine and sine of the head."""
+def place_linkage(t, state, work, index, x, y, theta, c, s):
+    """Links and cylinder of joint B `index` (row of all joint tables); its pivot on the head is (x, y), turned by theta."""
     joint, linkage, z, turns = t.joints[index], t.linkages[index], state.z, state.turns[index]
     section, left, right = z[joint.z + Z_SECTION], z[joint.z + Z_LINK_L], z[joint.z + Z_LINK_R]
     turns[HEAD_TURN], turns[HEAD_TURN + 1] = c, s
@@ -73,26 +75,37 @@ def place_linkage(t, state, work, index, x, y, c, s):
     bx, by, cl, sl = link_frame(linkage.mount, linkage, turns)
     wx, wy = rotated(cl, sl, linkage.along, linkage.left)
     ox, oy = origin_of(t, z, joint, linkage.mount, x, y)
-    place_rod(t, state, work, index, ox + bx + wx, oy + by + wy)
+    place_rod(t, state, work, index, ox + bx + wx, oy + by + wy, left if linkage.mount == LINK_L else right)
+    set_turn(t, work, joint, PIVOT, section - theta)
+    set_turn(t, work, joint, LINK_L_PIN, left - theta)
+    set_turn(t, work, joint, LINK_R_PIN, right - section)
+    set_turn(t, work, joint, Q_PIN, right - left)
 
 
 @inner
-def place_barrel(t, state, index, x, y):
-    """End C of cylinder `index`, whose pin is (x, y)."""
+def place_barrel(t, state, work, index, x, y, theta):
+    """End C of cylinder `index`, whose pin is (x, y) on a body turned by theta."""
     cylinder, pins = t.cylinders[index], state.pins[index]
     dx, dy = offset_of(t, state.z, cylinder, BARREL_END_PIN)
     pins[END_C], pins[END_C + 1] = x + dx, y + dy
+    set_turn(t, work, cylinder, BARREL_END_PIN, -theta)
 
 
 @inner
-def place_rod(t, state, work, index, x, y):
-    """End R of cylinder `index`, whose pin is (x, y), and with it the whole cylinder."""
+def place_rod(t, state, work, index, x, y, theta):
+    """End R of cylinder `index`, whose pin is (x, y) on a body turned by theta, and with it the whole cylinder."""
     cylinder, pins = t.cylinders[index], state.pins[index]
     dx, dy = offset_of(t, state.z, cylinder, ROD_END_PIN)
     pins[END_R], pins[END_R + 1] = x + dx, y + dy
     place_cylinder(
         cylinder, t.parts, pins[END_C], pins[END_C + 1], pins[END_R], pins[END_R + 1], state.history[X], work.position
     )
+    for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
+        row = t.clearances[k]
+        if row.friction > 0.0:
+            bush = theta if row.place == ROD_END_PIN else -work.position[row.turn]
+            angle = math.atan2(pins[END_R + 1] - pins[END_C + 1], pins[END_R] - pins[END_C])
+            work.position[row.turn] = near(angle - bush, state.history[X, row.turn])
 
 
 @inner
@@ -141,20 +154,21 @@ def place(t, state, work):
         elif kind == STATION:
             outlet = t.outlets[row]
             bx, by = rotated(c, s, outlet.x, outlet.y)
-            place_barrel(t, state, outlet.cylinder, x + bx, y + by)
+            place_barrel(t, state, work, outlet.cylinder, x + bx, y + by, theta)
         elif kind == ROD_PIN:
             outlet = t.outlets[row]
             bx, by = rotated(c, s, outlet.x, outlet.y)
-            place_rod(t, state, work, 0, x + bx, y + by)
+            place_rod(t, state, work, 0, x + bx, y + by, theta)
         elif kind == JOINT_B:
-            place_linkage(t, state, work, row, x, y, c, s)
+            place_linkage(t, state, work, row, x, y, theta, c, s)
             dx, dy = offset_of(t, z, t.joints[row], PIVOT)
             x, y, theta = x + dx, y + dy, z[t.joints[row].z + Z_SECTION]
             c, s = state.turns[row, SECTION_TURN], state.turns[row, SECTION_TURN + 1]
         elif kind == JOINT_A:
             joint = t.joints[row]
             bx, by = rotated(c, s, t.linkages[row].cx, t.linkages[row].cy)
-            place_barrel(t, state, row, joint.x + bx, joint.y + by)
+            place_barrel(t, state, work, row, joint.x + bx, joint.y + by, theta)
+            set_turn(t, work, joint, PIVOT, z[joint.z + Z_SECTION] - theta)
             state.turns[row, HEAD_TURN], state.turns[row, HEAD_TURN + 1] = c, s
             dx, dy = offset_of(t, z, joint, PIVOT)
             x, y, theta = joint.x + dx, joint.y + dy, z[joint.z + Z_SECTION]

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..elements.beam import Sizes
 from ..elements.beam_equations import BeamEquations, transfer_beam
+from ..elements.pin_contact import BARREL_END_PIN
 from ..elements.rigid_body import add_body_force, add_body_tangent, merge_outlet, pull_back
 from ..jit import inner, kernel
 from ..tables import (
@@ -23,7 +24,7 @@ from ..tables import (
     Z_FORCE_A,
     Z_SECTION,
 )
-from .clearance_pins import move_ends
+from .clearance_pins import move_ends, torque_of
 from .forward_kinematics import beam_part
 from .six_bar import close_loop, open_loop
 from .slider_crank import barrel_pin, close_base, join_rod
@@ -90,6 +91,7 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m):
             ex, ey = c * bx - sn * by, sn * bx + c * by
             merge_outlet(s, p, m, ex, ey, motion.renew)
             m -= 2
+            p[2] -= torque_of(t, work, t.cylinders[t.outlets[row].cylinder], BARREL_END_PIN)
         elif kind == ROD_PIN:
             m = join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m)
         elif kind == JOINT_B:

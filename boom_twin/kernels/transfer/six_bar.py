@@ -18,7 +18,7 @@ import numpy as np
 
 from ..elements.cylinder import AXIAL, END_C, END_R, cylinder_terms
 from ..elements.linkage import LINK_L
-from ..elements.pin_contact import LINK_L_PIN, PIVOT, Q_PIN
+from ..elements.pin_contact import LINK_L_PIN, PIVOT, Q_PIN, ROD_END_PIN
 from ..jit import inner
 from ..plane_algebra import factorise, rotated, substitute
 from ..tables import Z_FORCE_B, Z_LAMBDA, Z_LINK_L, Z_LINK_R, Z_SECTION
@@ -37,6 +37,7 @@ from .clearance_pins import (
     keep_rows,
     move_ends,
     take_rows,
+    torque_of,
 )
 from .forward_kinematics import link_frame
 
@@ -134,6 +135,7 @@ def _add_cylinder(t, state, work, index, motion, drive, drive_rate, g, h):
     for j in range(2):
         g[PIN_C + j] += own_g[END_C + j]
     g[FORCE] += own_g[AXIAL]
+    g[link] -= torque_of(t, work, cylinder, ROD_END_PIN)
     if not motion.renew:
         return
     add_link_tangent(

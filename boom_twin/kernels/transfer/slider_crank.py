@@ -17,11 +17,22 @@ C is `Motion.rate`. The barrel pin of cylinder 1 rotates with the base. With c f
 from __future__ import annotations
 
 from ..elements.cylinder import AXIAL, END_C, END_R, cylinder_terms
-from ..elements.pin_contact import HOLD_X, HOLD_Y, K_XX, K_XY, K_YY
+from ..elements.pin_contact import (
+    BARREL_END_PIN,
+    HOLD_X,
+    HOLD_Y,
+    K_XX,
+    K_XY,
+    K_YY,
+    ROD_END_PIN,
+    TORQUE,
+    TORQUE_TURN,
+    TORQUE_X,
+)
 from ..jit import inner
 from ..plane_algebra import factorise, rotated, substitute
 from ..tables import FRAME_COS, FRAME_SIN
-from .clearance_pins import condense_ends
+from .clearance_pins import condense_ends, torque_of
 
 
 @inner
@@ -71,11 +82,12 @@ def join_rod(t, state, work, motion, drive, drive_rate, row, c, sn, m):
     for i in range(2):
         p[i] += g[END_R + i]
     p[m] = g[AXIAL]
-    p[2] += bx * g[END_R + 1] - by * g[END_R]
+    p[2] += bx * g[END_R + 1] - by * g[END_R] - torque_of(t, work, cylinder, ROD_END_PIN)
     turns = t.hinges.shape[0]
     if turns > 0:
         cx, cy = barrel_pin(t, state)
-        p[m + 1] = turn_barrel_force(g, cx, cy) + hinge_moment(t.hinges[0], state.z[t.hinges[0].z], motion)
+        moment = hinge_moment(t.hinges[0], state.z[t.hinges[0].z], motion)
+        p[m + 1] = turn_barrel_force(g, cx, cy) + moment - torque_of(t, work, cylinder, BARREL_END_PIN)
     if not motion.renew:
         return m + 1 + turns
     for i in range(m + 1):
@@ -134,12 +146,26 @@ def close_base(t, work, renew, operation):
             a[i, j] = s[of, slot_of(j, offsets)]
     if joint.clearances:  # tangents are then new in every pass
         hold = work.hold[joint.first_clearance]
+        b[0, 0] += hold[TORQUE]
         b[2, 0] += hold[HOLD_X]
         b[3, 0] += hold[HOLD_Y]
         a[2, 2] += hold[K_XX]
         a[2, 3] += hold[K_XY]
         a[3, 2] += hold[K_XY]
         a[3, 3] += hold[K_YY]
+        a[0, 0] += hold[TORQUE_TURN]
+        for i in range(2):
+            a[0, 2 + i] += hold[TORQUE_X + i]
+            a[2 + i, 0] += hold[TORQUE_X + i]
+        if size > 2 + offsets:  # pin friction acts back on the base
+            turn = size - 1
+            b[turn, 0] -= hold[TORQUE]
+            a[turn, turn] += hold[TORQUE_TURN]
+            a[0, turn] -= hold[TORQUE_TURN]
+            a[turn, 0] -= hold[TORQUE_TURN]
+            for i in range(2):
+                a[turn, 2 + i] -= hold[TORQUE_X + i]
+                a[2 + i, turn] -= hold[TORQUE_X + i]
     if renew:
         for i in range(size):
             for j in range(size):

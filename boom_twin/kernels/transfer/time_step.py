@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..elements.pin_contact import CLOSED
-from ..integrators import REST, A, V, X, finish_step, prepare, start_step
+from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
 from ..jit import inner, kernel
 from ..result_row import results_in
 from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion
@@ -34,7 +34,7 @@ LONGEST_INCREMENT = 0.5  # rad, limit of the increments in one pass of a time st
 
 @kernel
 def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product, keep):
-    """Step the boom to drive lengths (m) and rates (m/s), both (n,), at its end.
+    """Step the boom to drive lengths (m) and rates (m/s), both (n,), at the instant that `scheme` solves for.
 
     Newton passes on exact kinematics: place, sweep in, sweep out, until the increments are small. Where journals with
     clearance hit their bushes the step is divided, so that impacts are resolved. `REST` as scheme gives static equilibrium
@@ -105,7 +105,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
             continue
         if status != OK:
             return status, total, size
-        note_contacts(t, state)
+        note_contacts(t, state, work)
         finish_step(now, work.position, work.hat, work.offset, work.velocity, work.acceleration, history)
         done += part
         if error < 0.1 and part < TICKS and done % (2 * part) == 0:
@@ -139,9 +139,9 @@ def first_part(t, state, scheme):
 
 @inner
 def least_part(t, scheme):
-    """Return the ticks of the shortest sub-step: all without clearance, or at rest."""
+    """Return the ticks of the shortest sub-step: all without clearance or outside generalised-alpha and Newmark."""
     part = TICKS
-    if t.clearances.shape[0] > 0 and scheme.family != REST:
+    if t.clearances.shape[0] > 0 and (scheme.family == GENERALISED_ALPHA or scheme.family == NEWMARK):
         while part > 1 and scheme.reach * part > 2.0 * SHORTEST * TICKS:
             part //= 2
     return part
@@ -215,7 +215,7 @@ def observe(t, state, out):
         found.tip[0, j], found.tip[1, j] = state.history[X, t.tip + j], state.history[V, t.tip + j]
         found.tip[2, j] = state.history[A, t.tip + j]
     for k in range(t.clearances.shape[0]):
-        at, hold = t.clearances[k].z, force_of_pin(t, state, k, 0.0, state.history[V])
+        at, hold = t.clearances[k].z, force_of_pin(t, state, k, state.history[X], 0.0, state.history[V])
         found.pins[k, 0], found.pins[k, 1] = state.z[at], state.z[at + 1]
         found.pins[k, 2], found.pins[k, 3] = math.hypot(hold.x, hold.y), state.contacts[k, CLOSED]
 
@@ -225,7 +225,7 @@ def run(t, state, work, steps, counts, drives, rates, loads, family, parameter, 
     """Step the boom along given drives, and write rows of results `out`, shape (rows, row_width), see `observe`.
 
     To each row lead `counts` (rows,) steps of `steps` (rows,) s. `drives` (m) and `rates` (m/s) have a row (n,) for the
-    end of each step, `loads` one for the force at the tip (N) there; no rows, no force. Before the
+    instant that each step solves for, `loads` one for the force at the tip (N) at its end; no rows, no force. Before the
     first step the force is ``work.load[1]``. For `family` and `parameter` see `kernels.integrators.prepare`, for the rest
     `advance`.
 

@@ -26,6 +26,9 @@ INTEGRATORS = (
     *(Method(parameter=rho) for rho in (0.0, 0.5, 0.9, 1.0)),
     Method("newmark", 0.5),
     Method("newmark", 0.6),
+    Method("wilson", 1.4),
+    Method("houbolt", 0.0),
+    Method("park", 0.0),
 )
 LUMPED_ELEMENTS = (1, 2, 3, 4)
 LUMPED_SCHEMES = ((1, 1e-3), (1, 5e-4), (1, 3e-4), (2, 3e-3), (2, 1e-3), (0, 1e-3))  # passes with a kept tangent, tolerance
@@ -45,8 +48,10 @@ class Own:
     @property
     def label(self) -> str:
         """Return all settings but the step."""
-        method = self.method
-        parts = [f"{method.integrator} {method.parameter:g}"]
+        method, scheme = self.method, self.method.integrator
+        if scheme in ("generalised-alpha", "newmark", "wilson"):
+            scheme += f" {method.parameter:g}"
+        parts = [scheme]
         parts += [] if self.modes is None else [f"{self.modes} modes" if self.modes > 1 else "1 mode"]
         parts += ["cantilever modes"] if self.basis == "cantilever" else []
         parts += ["one pass"] if method.passes == 1 else []

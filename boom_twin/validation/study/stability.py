@@ -29,6 +29,9 @@ METHODS: dict[str, Method] = {
     "rho 0": Method(parameter=0.0),
     "Newmark 0.5": Method("newmark", 0.5),
     "Newmark 0.6": Method("newmark", 0.6),
+    "Wilson 1.4": Method("wilson", 1.4),
+    "Houbolt": Method("houbolt"),
+    "Park": Method("park"),
     "single pass": Method(passes=1),
     "plain product": Method(product="plain"),
 }
