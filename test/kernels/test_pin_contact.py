@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from boom_twin.validation.contact_law import HYSTERESIS, Contact
 from compiled import compile_scene
 from kernels.journal import bearing, memory, row
 from oracle import booms
@@ -14,7 +15,6 @@ from scipy.integrate import solve_ivp
 
 from boom_twin.kernels.elements import pin_contact as contact
 from boom_twin.kernels.elements.pin_contact import APPROACH, CLOSED, COLUMNS, LAWS, SMOOTH, restitution_of
-from boom_twin.validation.contact_law import HYSTERESIS, Contact
 
 WITHIN = 0.005  # of a coefficient of restitution
 rng = np.random.default_rng(4)
