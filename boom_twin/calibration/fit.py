@@ -29,7 +29,7 @@ from .rest_filter import filter_rest
 from .sessions import STREAMS, RestPeriod, Rigging, channel_names
 from .unknowns import Unknown
 
-DIFFERENCE = 3e-3  # of a prior's deviation, of derivatives
+DIFFERENCE = 1e-3  # of a prior's deviation, of derivatives
 BLOCK = 2.0  # s of a block of readings, which are taken to depend on each other
 LOADS, USUAL = (1e-5, 0.3), 2.5e-3  # shares of the boom's weight, between which the load's size is looked for; at first
 
@@ -141,11 +141,16 @@ class CalibrationProblem:
         with ThreadPoolExecutor(usable_cores()) as pool:
             return Noise(np.array(list(pool.map(most_likely, self._periods))), sensors)
 
-    def slopes(self, deviations: Array, noise: Noise, base: Array) -> Array:
-        """Return derivatives of innovations and variances by the unknowns, (p, r, 2); `base` is at `deviations`."""
-        steps = DIFFERENCE * np.eye(len(deviations))
-        trials = (self.values(deviations + step) for step in steps)
-        return np.array([(found - base) / DIFFERENCE for found in self.innovations(trials, noise)])
+    def slopes(self, deviations: Array, noise: Noise) -> Array:
+        """Return derivatives of innovations and variances by the unknowns, (p, r, 2).
+
+        Differences are central. Zeros of strokes and angles nearly compensate each other, and differences to one side would
+        leave a false gradient in that direction.
+        """
+        low = np.maximum(deviations - DIFFERENCE, self.least)
+        ends = [np.where(own, end, deviations) for own in np.eye(len(low), dtype=bool) for end in (low + 2.0 * DIFFERENCE, low)]
+        found = np.array(self.innovations(map(self.values, ends), noise))
+        return np.asarray((found[::2] - found[1::2]) / (2.0 * DIFFERENCE))
 
     def slopes_by_model(self, deviations: Array, assumed: Sequence[Unknown], noise: Noise, base: Array) -> Array:
         """Return derivatives by parameters that are not estimated, in units of their standard deviations, (q, r, 2)."""
@@ -160,6 +165,7 @@ def likelihood_cost(found: Array) -> float:
 
 
 MOST = 12  # passes
+CLOSE = 0.1  # of the deviation of each estimate, by which the last pass may move it
 
 
 @dataclass(frozen=True)
@@ -173,6 +179,7 @@ class Fit:
     by_model: Array  # (p, q), change of the score by parameters that are not estimated, per standard deviation of these
     misfits: Array  # (c,), rms of each channel's normalised innovations with the stated noise; 1: noise alone, or no readings
     passes: int
+    is_settled: bool = True  # False if it still moved after `MOST` passes
 
     @property
     def precision(self) -> Array:
@@ -215,10 +222,10 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callab
         if learning:
             noise = problem.noise(at, stated)
         (base,) = problem.innovations([problem.values(at)], noise)
-        slopes = problem.slopes(at, noise, base)
+        slopes = problem.slopes(at, noise)
         score, information = _score(slopes, base)
         precision, pull = information + np.eye(len(at)), score.sum(axis=1) - at
-        if furthest < 0.1 or passes == MOST:  # of the deviation of an estimate
+        if furthest < CLOSE or passes == MOST:
             break
         step = bounded_minimum(precision, pull, problem.least - at)
         step /= max(1.0, float(np.abs(step).max()))  # one deviation of a prior at most
@@ -230,7 +237,7 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callab
     sums = np.array([np.bincount(problem.blocks, row) for row in score])
     by_model = _together(slopes, problem.slopes_by_model(at, assumed, noise, base), base)
     misfits = np.sqrt(_mean_squares(problem, base) * noise.channels / stated)
-    return Fit(at, information, sums @ sums.T, pull, by_model, misfits, passes)
+    return Fit(at, information, sums @ sums.T, pull, by_model, misfits, passes, furthest < CLOSE)
 
 
 def _shortened(problem: CalibrationProblem, at: Array, step: Array, noise: Noise, base: Array) -> Array:

@@ -24,6 +24,11 @@ from .unknowns import Choice, Unknown, assumed_of, unknowns_of, usual_names
 BEYOND = 0.01  # m, by which a stroke may be beyond the travel of its cylinder
 BETWEEN = 1.96  # deviations, of a normal distribution's 95 %
 
+UNSETTLED = (
+    "The estimates still moved in the last pass, so they are not those that fit best: do not use this result. Record more rest "
+    "periods in other postures, or estimate fewer parameters."
+)
+
 Progress = Callable[[float, str], None]
 
 
@@ -146,7 +151,7 @@ def calibrate(
     after = judged(better, rigging, sessions[-1], zeros, kept_from)
     progress(1.0, "done")
     held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
-    unusable = _worse(before, after)
+    unusable = _worse(before, after) if fit.is_settled else UNSETTLED
     remarks = (*_remarks(fit, problem.names, estimates, sessions), *([unusable] if unusable else []))
     misfit, judgements = float(fit.misfits.max()), (held_out, before, after, mapped, remarks, unusable)
     return Calibration(better, zeros, estimates, tuple(groups), misfit, fit.passes, tuple(sessions), *judgements)

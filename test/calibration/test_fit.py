@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.calibration.fit import Fit, bounded_minimum
+from boom_twin.calibration import fit
+from boom_twin.calibration.fit import CalibrationProblem, Fit, Noise, bounded_minimum, fitted
 
 
 def fit_of(slopes: np.ndarray, measured: np.ndarray, by_model: np.ndarray | None = None) -> Fit:
@@ -52,3 +53,43 @@ def test_the_covariance_allows_for_what_may_be_wrong_with_the_model() -> None:
     errors = np.linalg.solve(fit.precision, slopes.T @ readings.T)
     np.testing.assert_allclose(fit.covariance(), np.cov(errors) + np.linalg.inv(fit.precision) @ np.linalg.inv(fit.precision),
                                rtol=0.06, atol=2e-5)  # fmt: skip
+
+
+class Bent(CalibrationProblem):
+    """Two unknowns, the first of which has a lower bound, that change the readings by a square, too."""
+
+    names, channels, blocks, least = ("joint_2",), np.zeros(40, int), np.arange(40) // 4, np.array([-0.5, -np.inf])
+
+    def __init__(self) -> None:
+        self.readings = np.random.default_rng(7).normal(size=40)
+
+    def start(self):
+        return np.zeros(2)
+
+    def sensor_noise(self):
+        return np.ones(1)
+
+    def noise(self, deviations, sensors):
+        return Noise(np.ones((1, 2)), sensors)
+
+    def values(self, deviations):
+        assert deviations[0] >= self.least[0]
+        return dict(zip("ab", deviations.tolist(), strict=True))
+
+    def innovations(self, trials, noise):
+        bent = [trial["a"] + trial["b"] + 100.0 * trial["a"] ** 2 for trial in trials]
+        return [np.column_stack([self.readings - each, np.ones(40)]) for each in bent]
+
+    def slopes_by_model(self, *_):
+        return np.zeros((0, 40, 2))
+
+
+def test_derivatives_are_right_where_readings_bend_and_do_not_leave_the_bounds() -> None:
+    found = Bent().slopes(np.array([0.3, 0.2]), Noise(np.ones((1, 2)), np.ones(1)))
+    assert found[:, 0, 0] == pytest.approx([-61.0, -1.0], rel=1e-9) and not found[:, :, 1].any()
+    Bent().slopes(np.array([-0.5, 0.0]), Noise(np.ones((1, 2)), np.ones(1)))
+
+
+def test_a_fit_that_still_moves_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fit, "MOST", 1)
+    assert not fitted(Bent(), (), lambda passes: None).is_settled
