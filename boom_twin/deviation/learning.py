@@ -15,6 +15,7 @@ SURPRISE = 9.0  # largest square of a value that counts in the learnt variance, 
 LEAST_JERK, MOST_JERK = 1e-3, 10.0  # m^2/s^5
 OPENING = 1.0  # m/s^2, by which a valve that opens may accelerate the tip: standard deviation
 JERK_RISE, JERK_FALL = 0.05, 0.5  # s, in which that density is learnt
+LEAST_KNOWN = 0.1  # share of the variance of an acceleration that readings determine, at least
 MOVING = 0.1  # m/s, by which a drive that moves carries the tip: standard deviation
 OPENED = 5.0  # logarithm of the odds for a moving drive, above which its valve is believed open
 ALSO_OPEN = 0.2  # prior probability that a valve is open while another is
@@ -81,7 +82,8 @@ def learn_jerk(p, f, h):
             continue
         at = drive_place(p) + 2 * n + i
         shown = 2.0 / DRIVE_TIME * (f.x[OPEN, at] * f.x[OPEN, at] + f.p[OPEN, at, at])
-        time = JERK_RISE if shown > f.jerk[i] else JERK_FALL
+        known = max(1.0 - 2.0 / DRIVE_TIME * f.p[OPEN, at, at] / f.jerk[i], LEAST_KNOWN)
+        time = JERK_RISE if shown > f.jerk[i] else JERK_FALL * known
         f.jerk[i] = min(max(f.jerk[i] + min(h / time, 1.0) * (shown - f.jerk[i]), LEAST_JERK), MOST_JERK)
 
 
