@@ -22,10 +22,10 @@ from ..config.settings import Settings
 from ..deviation.states import Innovations
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
-from ..types import SECOND, Alarm, Array, Change, Ranked, StrokeReading
-from .causes import MEMORY, Evidence, Verdict, likeliest, scores
+from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
+from .causes import INDEPENDENT, MEMORY, Evidence, Verdict, likeliest, scores
 from .creep import SPAN, CreepMonitor
-from .faults import Fault, Follower, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
+from .faults import QUIET, Fault, Follower, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
 from .sensor_check import CAME_BACK, Flags
 
 IMPOSSIBLE = -1e9  # log likelihood of a boom whose twin fails
@@ -72,8 +72,11 @@ class FaultSearch:
         self._change: Change | None = None
         self._creep = CreepMonitor(scene)
         self._named: dict[Fault, Alarm] = {}
+        self._expects = 1.0  # unknown force that the filters expect, over the set one
         self._zeros_before: dict[str, tuple[int, float]] = {}  # place among a sensor's zeros, and its value before the onset
-        self._begin()
+        self._streams: set[Stream] = set()  # those that have come
+        self._hypotheses: list[Hypothesis] = []
+        self._twins: list[Follower] = []  # made when the first streams have come
 
     def _begin(self) -> None:
         """Make twins of the boom as believed, of that boom without each named lag, and of that boom with each other fault.
@@ -82,8 +85,9 @@ class FaultSearch:
         """
         known = tuple(self._named)
         causes = {fault.cause for fault in known if not fault.is_size}
+        possible = possible_faults(self._scene, self._reads, self._streams)
         fewer = [(fault, tuple(each for each in known if each is not fault)) for fault in known if fault.kind == "late"]
-        more = [(fault, (*known, fault)) for fault in possible_faults(self._scene, self._reads) if fault.cause not in causes]
+        more = [(fault, (*known, fault)) for fault in possible if fault.cause not in causes]
         faults, booms = zip((None, known), *fewer, *more, strict=True)
         found = [(fault, *each) for fault, each in zip(faults, self._cores.map(self._warm, booms), strict=True) if each]
         self._faults = [fault for fault, _, _ in found if fault is not None]
@@ -125,11 +129,13 @@ class FaultSearch:
         errors = [usual_size(self._scene, fault, self._settings.scene_error) for fault in self._faults]
         named = {fault.cause for fault in self._named}
         self._decision, self._age = Evidence(self._scene, self._faults, self._settings, errors, self._certain, named), 0
+        self._quiet = 0.0  # evidence that the filters expect too much unknown force
         self._unsure: dict[int, float] = {}  # evidence of faults below which their sizes are not looked for again
         self._evidence = np.array([twin.evidence for twin in self._twins])
 
     def _made(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower]:
         each = hypothesis(self._scene, faults)
+        each = each._replace(expects=self._expects * each.expects)
         twin = self._make(each)
         if self._change is not None:
             twin.requests.repeat(each.changed(self._change))
@@ -146,8 +152,13 @@ class FaultSearch:
             self._change = second.change
             for each, twin in zip(self._hypotheses, self._twins, strict=True):
                 twin.requests.repeat(each.changed(second.change))
-            self._decide_anew()
+            if self._twins:
+                self._decide_anew()
             return []
+        come = {list(Stream)[code] for code in np.unique(second.block.streams)}
+        if not come <= self._streams:
+            self._streams |= come
+            self._begin()
         if second.left_out is not None and self._is_newly_left_out(second.left_out):  # its last readings misled all states
             self._recent = deque((each._replace(left_out=second.left_out) for each in self._recent), MEMORY)
             self._begin()
@@ -181,14 +192,30 @@ class FaultSearch:
             return self._ended(fault, stamp)
         sized = [(each, fault.size) for each, fault in zip(innovations[1:], self._faults, strict=True) if fault.is_size]
         verdict = self._decision.take(stamp, grown, scores(innovations[0], *zip(*sized, strict=True)))
+        quieter = next((place for place, each in enumerate(self._faults, 1) if each.kind == "quieter"), 0)
+        self._quiet += INDEPENDENT * float(grown[quieter] - grown[0])
+        if self._quiet > self._decision.sure:
+            self._expect_less()
+            return []
         return [] if verdict is None else self._name(verdict, stamp)
+
+    def _expect_less(self) -> None:
+        """Let all filters expect less unknown force: a filter that expects too much follows noise, and a load would pay.
+
+        The twins have settled on the recent seconds, and the evidence of faults that there is still counts.
+        """
+        self._expects *= QUIET
+        faults, decision, age = self._faults, self._decision, self._age
+        self._begin()
+        if faults == self._faults:
+            self._decision, self._age = decision, age
 
     def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
         """Name the fault of a verdict, change its size, or end it; return its alarm if it begins or ends.
 
         Far from the boom as believed, innovations are not linear in sizes. So twins find the size of each ranked fault. The
-        fault is named if no other is as likely, each at its own size. Otherwise all are sized again once the evidence has grown
-        by the odds required for a name.
+        most likely one, each at its own size, is named by the odds required for a name. Otherwise all are sized again once
+        the evidence has grown by these odds.
         """
         fault, begin = self._faults[verdict.place], verdict.onset
         if fault in self._named:  # a lag
@@ -203,15 +230,15 @@ class FaultSearch:
         healthy = np.zeros(0) if fault.kind == "off" else self._course(fault._replace(size=0.0), begin)
         found = {place: each for place, trial in faults.items() if (each := self._sized(trial, begin, healthy)) is not None}
         likely = {place: each[3] for place, each in found.items()}
-        if verdict.place not in found or any(
-            likely[verdict.place] - each < self._decision.sure for place, each in likely.items() if place != verdict.place
-        ):
+        best = max(likely, key=lambda place: likely[place], default=verdict.place)
+        rivals = [likely[best] - each for place, each in likely.items() if place != best]
+        if verdict.place not in found or min(rivals, default=math.inf) < self._decision.sure:
             if fault.is_size:
                 self._unsure[verdict.place] = verdict.evidence + self._decision.sure
             else:
                 self._decision.postpone(verdict.place, verdict.evidence)
             return []
-        sized, spread, onset, _ = found[verdict.place]
+        sized, spread, onset, _ = found[best]
         if fault.kind == "off" and abs(sized.size) < self._certain * spread:  # its zero still drifts
             return []
         if (before := next((each for each in self._named if each.cause == sized.cause), None)) is not None:
@@ -219,10 +246,19 @@ class FaultSearch:
         named = sized.signed()
         evidence = evidence_of(named, spread) if named.is_told else ""
         part = (named.kind, named.size, spread, named.unit)
-        causes = tuple(Ranked(cause, p, (part,) if cause == named.cause else ()) for cause, p in verdict.ranked)
+        ranked = verdict.ranked if len(likely) == 1 else self._ranked(verdict, likely)
+        causes = tuple(Ranked(cause, p, (part,) if cause == named.cause else ()) for cause, p in ranked)
         alarm = self._named[named] = Alarm(named.channel, named.kind, onset, None, named.cause, evidence, causes)
-        self._believe(named, verdict.place + 1)
+        self._believe(named, best + 1)
         return [alarm] if named.is_told else []
+
+    def _ranked(self, verdict: Verdict, likely: dict[int, float]) -> list[tuple[str, float]]:
+        """Return causes of certain size by their posterior probabilities, then the rest as `UNKNOWN`."""
+        unknown, rest = verdict.ranked[-1]
+        weights = {place: math.exp(each - max(likely.values())) for place, each in likely.items()}
+        share = (1.0 - rest) / sum(weights.values())
+        found = [(self._faults[place].cause, share * weight) for place, weight in weights.items()]
+        return [*sorted(found, key=lambda each: -each[1]), (unknown, rest)]
 
     def _may_leak(self, fault: Fault, age: int) -> bool:
         """Return True if an apparent softer spring of this `age` (ns) may be a leak, or a stroke transducer that is off.

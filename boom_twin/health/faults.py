@@ -21,7 +21,7 @@ from .sensor_check import Flags
 
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
 LATE = 0.02  # s, delay of the stamps of a stream
-QUIET = 0.4  # unknown force that the filter of a boom under less load expects, over the set one
+QUIET = 0.1  # unknown force that the filter of a boom under less load expects, over the set one
 
 
 class Fault(NamedTuple):
@@ -160,8 +160,8 @@ def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
     return Hypothesis(scene, extra["tip.payload"], extra["line_fill"], frozenset(doubted), tuple(delays), expects)
 
 
-def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
-    """Return all single faults that are compared for a boom.
+def possible_faults(scene: Scene, reads: StrokeReading, streams: Collection[Stream]) -> list[Fault]:
+    """Return all single faults that are compared for a boom whose sensors send these streams.
 
     Warm oil, which softens all cylinders, heavier sections and a quiet tip raise no alarm. They are compared because they
     explain readings.
@@ -173,11 +173,10 @@ def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -
     found.append(Fault("tip.load", "quieter", 1.0, False))
     found.append(Fault("tip.payload", "more", LOAD * mass))
     found.append(Fault("line_fill", "more", 2.0 * LOAD * mass / scene.reach))
-    names_of = channels_of(len(scene.joints))
-    angles = () if reads is StrokeReading.ANGLE else names_of[Stream.ANGLES]
-    found += [Fault(f"{name}.sensor", "off") for name in (*angles, "tip_imu", *names_of[Stream.FORCES])]
-    streams = dict.fromkeys((reads.stream, Stream.ANGLES, Stream.IMU, Stream.FORCES))
-    return [*found, *(Fault(f"{stream.value}.delay", "late", LATE) for stream in streams)]
+    names = channels_of(len(scene.joints)) | {Stream.IMU: ("tip_imu",)}
+    measured = [each for each in (Stream.ANGLES, Stream.IMU, Stream.FORCES) if each in streams]
+    found += [Fault(f"{name}.sensor", "off") for each in measured if each is not reads.stream for name in names[each]]
+    return [*found, *(Fault(f"{each.value}.delay", "late", LATE) for each in dict.fromkeys((reads.stream, *measured)))]
 
 
 def usual_size(scene: Scene, fault: Fault, error: float) -> float:
