@@ -18,7 +18,6 @@ JERK_RISE, JERK_FALL = 0.05, 0.5  # s, in which that density is learnt
 LEAST_KNOWN = 0.1  # share of the variance of an acceleration that readings determine, at least
 MOVING = 0.1  # m/s, by which a drive that moves carries the tip: standard deviation
 OPENED = 5.0  # logarithm of the odds for a moving drive, above which its valve is believed open
-ALSO_OPEN = 0.2  # prior probability that a valve is open while another is
 SHUT_TIME = 0.15  # s with odds against it, after which a valve is believed closed
 LEARN_LENGTH = 0.02  # share of a third difference that counts for the noise of a length
 UNEVEN = 0.5  # largest relative change of the sampling interval within a third difference
@@ -29,27 +28,19 @@ def watch_valves(p, f, h, mixture, size):
     """Set valves of a mixture open or closed by the rates of their drives in its model in which all are open.
 
     When one opens, the models take over what that model knows, and a sudden load is as good as excluded, see `interact`.
-
-    While one is open, another drive may move too slowly for the odds to tell. Its mean square rate is that in the model of
-    open valves times the probability that it moves. Taken to stand still, its path would look like a load.
     """
     n, drive, opened = p.drives.shape[0], drive_place(p), False
     first, is_open, still = first_model(mixture), f.is_open[mixture], f.still[mixture]
     moving = first + OPEN
-    is_likely, any_open = f.chances[moving] > 0.5, is_open.any()
     for i in range(n):
         at = drive + n + i
         odds = log_odds(f.x[moving, at], f.p[moving, at, at], MOVING * MOVING / max(reach2(p, 2 + i), 1e-9))
         still[i] = still[i] + h if odds < 0.0 else 0.0
-        stands = (1.0 - ALSO_OPEN) / ALSO_OPEN * math.exp(-odds)
-        f.unseen2[mixture, i] = (f.x[moving, at] * f.x[moving, at] + f.p[moving, at, at]) / (1.0 + stands)
-        if odds > OPENED and (is_likely or any_open):
-            opened |= is_likely and is_open[i] == 0
+        if odds > OPENED and f.chances[moving] > 0.5:
+            opened |= is_open[i] == 0
             is_open[i] = 1
         elif still[i] > SHUT_TIME:
             is_open[i] = 0
-    if not is_open.any():
-        f.unseen2[mixture] = 0.0
     if opened:
         copy_model(f, moving, first + VALVES, size)
         copy_model(f, moving, first + BURST, size)

@@ -29,7 +29,6 @@ import math
 
 from ..kernels.jit import inner, kernel
 from .kalman import (
-    DRIVE_TIME,
     FAST,
     correct,
     first_variances,
@@ -98,7 +97,7 @@ def start_models(p, f, speed, swing, may_move):
         f.jerk[i], f.is_open[PREDICTION, i], f.still[PREDICTION, i] = JERK, 1 if may_move else 0, 0.0
         f.length2[i], f.pulls[i] = noise.length2, p.pulled[i]
         f.before[i, 0] = f.before[i, 1] = f.before[i, 2] = math.nan
-    f.bends[:], f.swing[:], f.sway2[:], f.unseen2[:] = 0.0, 0.0, 0.0, 0.0
+    f.bends[:], f.swing[:], f.sway2[:] = 0.0, 0.0, 0.0
     copy_model(f, VALVES, OPEN, size)
     add_motion(p, f, speed, swing)
     if may_move:
@@ -164,7 +163,7 @@ def step_models(p, f, h, y):
                 for _ in range(steps):
                     transit(p, f, k, states, h / steps, f.load2[mixture], least2)
                 if k != first + OPEN:
-                    hold_still(p, f, k, h, mixture, states)
+                    hold_still(p, f, k, f.is_open[mixture], states)
     note_innovations(p, f, y)
     evidence = 0.0
     for mixture in range(mixtures):
@@ -192,14 +191,9 @@ def states_of(p, mixture):
 
 
 @inner
-def hold_still(p, f, k, h, mixture, size):
-    """Correct model `k` by readings of zero rate and acceleration of drives behind closed valves, over `h` (s).
-
-    A drive may move unseen, see `watch_valves`: its rate is a Gauss-Markov process with the correlation time T of drives. As
-    noise of these readings it has the spectral density of that process, 2 T times the mean square.
-    """
+def hold_still(p, f, k, is_open, size):
+    """Correct model `k` by readings of zero rate and acceleration of drives behind closed valves."""
     n, drive, count, gains, width = p.drives.shape[0], drive_place(p), 0, f.gains[0], whole(size)
-    is_open = f.is_open[mixture]
     keep_unread(p, f, k, size)
     for i in range(n):
         if is_open[i] == 0 and not f.deaf[i]:
@@ -210,8 +204,7 @@ def hold_still(p, f, k, h, mixture, size):
                 for c in range(count):
                     subtract(gain, gains[c, at], gains[c], size)
                 noise = CLOSED_RATE if order == 1 else CLOSED_ACCELERATION
-                unseen = 2.0 * DRIVE_TIME / h * f.unseen2[mixture, i] / (1.0 if order == 1 else DRIVE_TIME * DRIVE_TIME)
-                expected = gain[at] + noise * noise + unseen
+                expected = gain[at] + noise * noise
                 count = take_innovation(f.x[k], f.p[k], gains, count, -f.x[k, at], expected, size)
     take_gains(f.p[k], gains, count, size)
     restore_unread(p, f, k, size)

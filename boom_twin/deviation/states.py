@@ -58,7 +58,6 @@ class Filters(NamedTuple):
     jerk: Array  # (n,) density of the jerk of drives, m^2/s^5
     is_open: NDArray[np.int64]  # (2, n) 1 where a valve is believed open
     still: Array  # (2, n) time since its drive began to stand still, s
-    unseen2: Array  # (2, n) mean square rate that a drive behind a valve believed closed may have, m^2/s^2
     # (5,) whether the estimate has readings of its own, stamp of the newest of these, doubts by the prediction, whether its
     # covariance in `spread` is older than its models, stamp of the first lengths
     status: NDArray[np.int64]
@@ -134,7 +133,7 @@ def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoi
     return Filters(
         x=np.zeros((6, states)), p=vectors(6, states, states), chances=np.zeros(6), mean=np.zeros((2, states)),
         spread=vectors(2, states, states), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros((2, n), np.int64),
-        still=np.zeros((2, n)), unseen2=np.zeros((2, n)), status=np.zeros(5, np.int64), masked=np.zeros(channels, np.bool_),
+        still=np.zeros((2, n)), status=np.zeros(5, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(2), bends=np.zeros((sites, 2)),
         ways=np.zeros((n + 1, 7)), swing=np.zeros(modes), inputs=np.zeros(2 * modes),

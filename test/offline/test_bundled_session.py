@@ -16,7 +16,7 @@ from boom_twin.cli.replay import as_text
 from boom_twin.types import StrokeReading
 
 SESSIONS = {"length": Path(__file__).parents[2] / "bags" / "arch_session", "drive": ARCH_DRIVES}
-NEARER = {"length": 0.95, "drive": 0.8}  # most that the error of the estimate is of that of the prediction
+NEARER = {"length": 1.0, "drive": 0.8}  # most that the error of the estimate is of that of the prediction
 SENSOR = 1.745e-4  # rad, a joint encoder's own noise
 
 
