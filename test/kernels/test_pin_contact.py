@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from boom_twin.validation.contact_law import HYSTERESIS, Contact
 from compiled import compile_scene
 from kernels.journal import bearing, memory, row
 from oracle import booms
 from oracle.clearance import drop
 from oracle.clearance.drop import PUBLISHED, restitution
 from oracle.clearance.scenes import RODS, with_pins
+from reference.contact_law import HYSTERESIS, Contact
 from scipy.integrate import solve_ivp
 
 from boom_twin.kernels.elements import pin_contact as contact
