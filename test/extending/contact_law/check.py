@@ -34,7 +34,7 @@ memory[CLOSED], memory[APPROACH] = 1.0, SPEED
 
 def force(x, v):
     """Of the pin, N, outward along x (m) at v (m/s)."""
-    return pin_force(row, memory, Journal(x, 0.0, v, 0.0, v, 0.0, 1.0, 0.0), 0.0).x
+    return pin_force(row, memory, Journal(x, 0.0, v, 0.0, v, 0.0, 0.0, 1.0, 0.0), 0.0).x
 
 
 depth = 5e-5
