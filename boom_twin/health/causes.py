@@ -167,7 +167,9 @@ class Evidence:
         best, onsets = every.max(axis=0), len(every) - 1 - every[::-1].argmax(axis=0)
         evidence = best + np.log(np.exp(every - best).mean(axis=0))
         evidence[evidence < self._needed] = NONE
-        causes = {"": 0.0} | {fault.cause: each for fault, each in zip(self._faults, evidence.tolist(), strict=True)}
+        causes = {"": 0.0}
+        for fault, each in zip(self._faults, evidence.tolist(), strict=True):  # a named fault may have ended, or changed
+            causes[fault.cause] = np.logaddexp(causes.get(fault.cause, NONE), each)
         weights = np.exp(np.array(list(causes.values())) - max(causes.values()))  # all are equally probable before
         chances = dict(zip(causes, (weights / weights.sum()).tolist(), strict=True))
         place = int(np.argmax(evidence))

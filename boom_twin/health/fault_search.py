@@ -79,14 +79,16 @@ class FaultSearch:
         self._twins: list[Follower] = []  # made when the first streams have come
 
     def _begin(self) -> None:
-        """Make twins of the boom as believed, of that boom without each named lag, and of that boom with each other fault.
+        """Make twins of the boom as believed, of that boom without each named fault, and of that boom with each other fault.
 
-        The twin of a named fault that has a size lets that size grow or shrink.
+        A further twin of a named fault that has a size lets that size grow or shrink. The end of a sensor fault shows in its
+        estimated zero.
         """
         known = tuple(self._named)
         causes = {fault.cause for fault in known if not fault.is_size}
         possible = possible_faults(self._scene, self._reads, self._streams)
-        fewer = [(fault, tuple(each for each in known if each is not fault)) for fault in known if fault.kind == "late"]
+        ends = [(fault._replace(kind="ended"), tuple(each for each in known if each is not fault)) for fault in known]
+        fewer = [each for each in ends if not each[0].cause.endswith(".sensor")]
         more = [(fault, (*known, fault)) for fault in possible if fault.cause not in causes]
         faults, booms = zip((None, known), *fewer, *more, strict=True)
         found = [(fault, *each) for fault, each in zip(faults, self._cores.map(self._warm, booms), strict=True) if each]
@@ -218,8 +220,8 @@ class FaultSearch:
         the evidence has grown by these odds.
         """
         fault, begin = self._faults[verdict.place], verdict.onset
-        if fault in self._named:  # a lag
-            return self._ended(fault, begin)
+        if fault.kind == "ended":
+            return self._ended(next(each for each in self._named if each.cause == fault.cause), begin)
         is_softer = fault.kind == "softer" and verdict.sizes[verdict.place] > 0.0
         if (is_softer and self._may_leak(fault, stamp - begin)) or verdict.evidence < self._unsure.get(verdict.place, 0.0):
             return []

@@ -28,7 +28,7 @@ class Fault(NamedTuple):
     """Fault of a boom.
 
     cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off``, ``late``,
-    ``heavier`` of a section, or ``quieter``: less unknown force at the tip than the filter expects. size : relative loss, kg,
+    ``ended`` of a named one, ``heavier`` of a section, or ``quieter``: less unknown force at the tip than the filter expects. size : relative loss, kg,
     kg/m, s, relative mass; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis ``off`` lets the zero drift by any
     amount. is_told : False if the fault raises no alarm and only competes with the others.
     """
@@ -41,7 +41,7 @@ class Fault(NamedTuple):
     @property
     def is_size(self) -> bool:
         """True if the fault is a change of a parameter of the boom."""
-        return self.kind not in ("off", "late")
+        return self.kind not in ("off", "late", "ended")
 
     @property
     def unit(self) -> str:

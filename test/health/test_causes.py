@@ -472,6 +472,16 @@ def test_a_fault_comes_and_goes():
     assert twins.alarms == []
 
 
+def test_the_end_of_a_fault_of_any_size_is_told():
+    """A boom believed 60 % too soft is so far off that a still softer one predicts neither better nor worse."""
+
+    def made(each):
+        return Follower(misfit=lambda second: np.minimum(spring(each, 0.6 if 20 <= second < 60 else 0.0), 1.0))
+
+    begun, ended = taken(FaultTwins(load_scene(), made, SETTINGS), 90)
+    assert begun.cause == ended.cause == "cylinder_2.k" and ended.until == 60 * SECOND
+
+
 def test_a_recorded_load_is_the_load_of_all_twins():
     """A change of the load while recording reaches every twin, with what its hypothesis adds."""
     made = []
