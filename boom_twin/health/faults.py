@@ -28,9 +28,9 @@ class Fault(NamedTuple):
     """Fault of a boom.
 
     cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off``, ``late``,
-    ``ended`` of a named one, ``heavier`` of a section, or ``quieter``: less unknown force at the tip than the filter expects. size : relative loss, kg,
-    kg/m, s, relative mass; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis ``off`` lets the zero drift by any
-    amount. is_told : False if the fault raises no alarm and only competes with the others.
+    ``ended`` of a named one, ``heavier`` of a section, or ``quieter``: less unknown force at the tip than the filter expects.
+    size : relative loss, kg, kg/m, s, relative mass; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis ``off``
+    lets the zero drift by any amount. is_told : False if the fault raises no alarm and only competes with the others.
     """
 
     cause: str
