@@ -23,6 +23,7 @@ from .output import open_scene, print_result, warn
 if TYPE_CHECKING:
     from ..analysis.frequency_response import FrequencyResponse
 
+NO_MODES = "natural frequencies: none: nothing in this model can vibrate"
 Flags = NDArray[np.bool_]
 LOW, HIGH, POINTS, RATES = 0.05, 30.0, 300, (0.2, 1.2, 201)
 
@@ -151,7 +152,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     return Answer(
         "response",
         values | {name: column for name, column in columns.items() if name != "frequency_Hz"},
-        [title, "", *_resonances(result, static, natural, bounded)],
+        [title, "", *_resonances(result, static, natural, bounded), *([] if len(rest.frequencies) else [NO_MODES])],
         columns,
         lambda path: response_picture(path, title, unit, result, natural),
         doubts,
