@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 
 SESSION = "a rosbag2 directory, a directory of its files, or one file: .mcap, .db3, .bag of ROS 1, .csv"
+SESSION_NAMESPACE = "ROS namespace of the node in the session, for its topics"
 SESSION_SCENE = "scene file (YAML); without it, the one that the session was made with, else the default scene"
 
 

@@ -23,10 +23,12 @@ from ..scene.load import SceneSource, as_scene
 from ..types import (
     LIMIT,
     NANO,
+    NO_CHANNELS,
     NO_PLACES,
     SECOND,
     Array,
     Change,
+    Channel,
     Mount,
     Place,
     Sample,
@@ -76,6 +78,7 @@ class SampleTaker:
         places: Mapping[str, Place] = NO_PLACES,
         lagging: Collection[Stream] = (),
         is_follower: bool = False,
+        declared: Mapping[str, Channel] = NO_CHANNELS,
     ) -> None:
         self.reads, self._drive, self.absent, scene = reads, reads.stream, frozenset(absent), as_scene(scene)
         if not isinstance(settings, Settings | None):
@@ -83,7 +86,7 @@ class SampleTaker:
         self.scene, self.settings, self._health = scene, settings or Settings(), health
         self.counts: Counter[str] = Counter()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
-        self.places, self.lagging = dict(places), tuple(lagging)
+        self.places, self.lagging, self._declared = dict(places), tuple(lagging), declared
         self._channels = channels_of(len(scene.joints), streams_of(self.places))
         self.absent |= {name for name in self._channels[Stream.MOMENTS] if name not in self.places}
         self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
@@ -136,7 +139,8 @@ class SampleTaker:
         boom.sensors.doubt(self._doubted)
         judge: HealthMonitor | None = None
         if self._health:
-            judge = HealthMonitor(scene, settings, self.mounts, self.absent, boom.channels, self.reads, self.places)
+            sensors = self.mounts, self.absent, boom.channels, self.reads, self.places, self._declared
+            judge = HealthMonitor(scene, settings, *sensors)
             judge.fault_twins = self._fault_twins
         self._boom, self.plan, self.judge = boom, boom.plan, judge
         limits = limits_of(self.scene, boom, settings, self.absent, self.reads)

@@ -54,6 +54,9 @@ class Twin(SampleTaker):
         Streams with an unknown lag or lead of their stamps. It is estimated, see `clocks`.
     is_follower : bool
         True for a fault twin: its samples are already checked, and their reports are empty.
+    declared : mapping of str to Channel, optional
+        Units, signs, zeros and scales by which a mapping turned readings to samples. Alarms of the wiring name others relative
+        to them, as `boom_twin mapping --check` does. By default, readings are samples.
 
     Attributes
     ----------

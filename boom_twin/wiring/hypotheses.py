@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
-from ..types import GIVE, SENSORS, Array, Mount, Stream
-from .readings import Channel, Expected, Table
+from ..types import GIVE, SENSORS, Array, Channel, Mount, Stream
+from .readings import Expected, Table
 
 ANGLE_ERROR = math.radians(0.7)  # rad, zero error of an encoder and error of the scene
 MOST = 12.0  # nats, largest cost of a block, as a reading may err for a reason without hypothesis
@@ -104,6 +104,11 @@ def settings_of(declared: Sequence[Channel], j: int, name: str) -> Channel:
 def si(channel: Channel, units: Mapping[str, float], readings: Array) -> Array:
     """Return readings as quantities, SI."""
     return channel.sign * channel.scale * units[channel.unit] * (readings - channel.zero)
+
+
+def as_read(channel: Channel, units: Mapping[str, float], quantities: Array) -> Array:
+    """Return the readings of quantities (SI), the inverse of `si`."""
+    return quantities / (channel.sign * channel.scale * units[channel.unit]) + channel.zero
 
 
 def ways(base: Channel, units: Mapping[str, float]) -> list[Channel]:
