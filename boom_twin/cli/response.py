@@ -121,7 +121,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     from ..plots.analysis import response_picture
 
     modes_sought = 40  # natural frequencies that are looked for within the band
-    beside, sharp = 1.0 + 1e-6, 3.0  # a peak `sharp` times as high as at `beside` times its frequency is not damped
+    beside, sharp = 1.0 + 1e-6, 3.0  # undamped: at `beside` times the frequency, the peak is lower by the factor `sharp`
 
     if not 0.0 < args.low < args.high < float("inf"):
         raise UsageError(f"--from {args.low:g} --to {args.high:g}: both must be above 0 Hz. Give the lower one first.")

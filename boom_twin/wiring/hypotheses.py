@@ -158,7 +158,7 @@ def _angle_errors(readings: Array, own: Channel, expected: Expected, j: int) -> 
 
 
 def other_boom(table: Table, declared: Sequence[Channel], expected: Expected) -> tuple[float, Array]:
-    """Return the cost of angles as declared at a boom with other linkages, and by what they turn its sections (blocks, n)."""
+    """Return the cost of declared angles at a boom with other linkages, and the rotations of its sections, rad (blocks, n)."""
     cost, turns, turn, units = OTHER_BOOM, list[Array](), np.zeros(len(table.values)), SENSORS[Stream.ANGLES].units
     for j, own in enumerate(declared):
         off = _angle_errors(si(own, units, table.values[:, table.names.index(own.name)]), own, expected, j)

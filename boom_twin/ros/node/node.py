@@ -212,7 +212,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._twin.renew()
         self._diagnostics.start()
         gc.collect()
-        gc.freeze()  # what lives from here on as long as the node is not searched again
+        gc.freeze()  # objects that live as long as the node are not collected again
         for name, streams in self._topics.streams_by_topic.items():
             topic = self._topics.inputs[streams[0]]
             kind, qos = message_class(topic.type), qos_profile(topic.qos)
