@@ -99,7 +99,7 @@ def refuse_given(args: Namespace, remedy: str, *names: str) -> None:
     """Raise UsageError, with the `remedy`, if one of these arguments is given."""
     for name in names:
         value = getattr(args, name)
-        if value is not None and value is not False:
+        if value is not None and value is not False and value != "":
             first = value[0] if isinstance(value, list) else value
             shown = "" if value is True else f" {first:g}" if isinstance(first, float) else f" {first}"
             raise UsageError(f"--{name.replace('_', '-')}{shown}: {remedy}")

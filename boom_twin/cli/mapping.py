@@ -25,7 +25,7 @@ def run(args: Namespace) -> int:
     if args.check is not None:
         return _check(args)
     remedy = "only with --check BAG; without it, the default mapping is printed. Add --check BAG."
-    refuse_given(args, remedy, "scene", "mapping", "out", "duration", "json")
+    refuse_given(args, remedy, "scene", "mapping", "namespace", "out", "duration", "json")
     from ..messages.topic_table import DEFAULT_FILE
 
     sys.stdout.write(DEFAULT_FILE.read_text(encoding="utf-8"))

@@ -188,8 +188,9 @@ def test_a_session_of_another_boom_is_refused(rows: Rows, tmp_path: Path, capsys
     fewer = rows._replace(strokes=rows.strokes[:, :2], joints=rows.joints[:, :2])
     assert main(["mapping", "--check", str(written(fewer, tmp_path / "bag"))]) == 1
     assert "no time in which all 4 cylinders" in capsys.readouterr().err
-    assert main(["mapping", "--out", "x.yaml"]) == 1
-    assert "Add --check BAG" in capsys.readouterr().err
+    for option, value in (("--out", "x.yaml"), ("--namespace", "front")):
+        assert main(["mapping", option, value]) == 1
+        assert f"{option} {value}: only with --check BAG" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("has_imu", [True, False])
