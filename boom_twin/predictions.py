@@ -70,7 +70,7 @@ class Prediction:
     joints: Array
     strokes: Array
     cylinder_forces: Array
-    shape: Array | None
+    shape: Array | None = None
     undeflected: Array | None = None
     pins: Array | None = None
     clearances: Array | None = None

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import Enum, StrEnum
 from math import pi
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from .predictions import Estimate, Prediction
 from .sensor_kinds import SensorKind, gyro_kind, imu_kind
@@ -88,6 +88,19 @@ class Place:
     turned: float = 0.0  # angle of the sensor's x axis to the section, positive as a section is raised, rad
 
 
+class Channel(NamedTuple):
+    """Way to read a channel: quantity = sign * scale * (reading - zero), in `unit`. `turned` is an IMU's rotation, rad."""
+
+    name: str
+    unit: str
+    sign: int = 1
+    zero: float = 0.0
+    scale: float = 1.0
+    absolute: Mount | None = None
+    turned: float = 0.0
+
+
+NO_CHANNELS: Mapping[str, Channel] = {}
 NO_PLACES: Mapping[str, Place] = {}  # of a boom whose only placed sensor is the tip IMU, at the tip
 
 SENSORS: dict[Stream, SensorKind] = {

@@ -127,6 +127,8 @@ class LinearisedBoom:
             told = f"clearance.pins = {', '.join(self.plan.pins)}: a boom with play in its pins does not answer in proportion"
             raise UsageError(f"{told}, so it has no frequency response. Leave the block clearance out, or simulate.")
         self.stations = stations(scene)
+        yields = scene.base.stiffness is not None or any(scene.is_flexible(i) for i in range(self.plan.joints))
+        self._is_rigid = not yields and not self.plan.compliances_and_lags(strokes)[0].any()
         place(self.plan.tables, self._state, work)
         self._drive = drive_at_rest(self.plan, self._state, work)
         stretches = work.position[self.plan.tables.cylinders.history] - self._drive
@@ -145,10 +147,13 @@ class LinearisedBoom:
         damped = np.outer(rates, self._lags)
         every[:, TIP_FORCE:] *= (self._gains + damped) / (1.0 + damped)
         increments, tip = self._increments(rates, every)
+        joints = np.asarray(increments @ self._joints.T, complex)
+        if self._is_rigid and not every[:, TIP_FORCE:].any():  # nothing moves; what was computed is rounding
+            tip[:], joints[:] = 0.0, 0.0
         return FrequencyResponse(
             frequencies=np.asarray(frequencies, float),
             tip=tip[:, :2],
-            joints=np.asarray(increments @ self._joints.T, complex),
+            joints=joints,
             cylinder_forces=increments[:, self.plan.tables.cylinders.z],
             moments=np.asarray(increments @ self._moments.T, complex),
             stations=self.stations,

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 
 SESSION = "a rosbag2 directory, a directory of its files, or one file: .mcap, .db3, .bag of ROS 1, .csv"
+SESSION_NAMESPACE = "ROS namespace of the node in the session, for its topics"
 SESSION_SCENE = "scene file (YAML); without it, the one that the session was made with, else the default scene"
 
 
@@ -98,7 +99,7 @@ def refuse_given(args: Namespace, remedy: str, *names: str) -> None:
     """Raise UsageError, with the `remedy`, if one of these arguments is given."""
     for name in names:
         value = getattr(args, name)
-        if value is not None and value is not False:
+        if value is not None and value is not False and value != "":
             first = value[0] if isinstance(value, list) else value
             shown = "" if value is True else f" {first:g}" if isinstance(first, float) else f" {first}"
             raise UsageError(f"--{name.replace('_', '-')}{shown}: {remedy}")

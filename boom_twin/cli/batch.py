@@ -39,7 +39,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Replay what is not done yet, and write the table of all; exit code 1 if a session failed."""
+    """Replay the sessions that are not done yet, and write the table of all; exit code 1 if a session failed."""
     from ..batch.folder import PAGE, RIGS, TABLE, batch_folder, sessions_of, write_table
     from ..batch.results import counts, write_summaries
     from ..batch.session_task import OK, REMEDY, rows_here, rows_on_cluster

@@ -98,7 +98,7 @@ def as_json(done: ImportedSession, out: Path) -> dict[str, Any]:
 
 
 def as_text(done: ImportedSession, out: Path) -> list[str]:
-    """Return what was taken for what, with units and first values."""
+    """Return a table of channels with their columns, units and first values, and lines on times and counts."""
     found = done.assignment
     rows = [["channel", "column", "unit", "first values", "file"]]
     for use in sorted(found.used, key=lambda use: (list(sensor_kind(use.channel).units), use.channel)):
@@ -123,7 +123,7 @@ def _first(done: ImportedSession, use: ColumnUse) -> list[float]:
 
 
 def proposal(found: Assignment, timezone: str | None) -> list[str]:
-    """Return the lines of a columns file with what is recognised, and the other columns as comments."""
+    """Return the lines of a file for ``--columns``: recognised columns, and the others as comments."""
     lines = ["# Columns for `boom_twin import FILES --columns FILE`. Signs, zeros and mounts of sensors belong into a mapping."]
     lines += [f"timezone: {timezone}" if timezone else "# timezone: Europe/Berlin   # of local times", "time:"]
     for number, places in enumerate(found.times):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable
 from ..types import NANO, StrokeReading
-from .arguments import SESSION, add_json, add_session, window_of
+from .arguments import SESSION, SESSION_NAMESPACE, add_json, add_namespace, add_session, window_of
 from .output import columns, open_session_scene, print_result
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("bag", metavar="BAG", help=SESSION)
     add_session(parser, params=False)
+    add_namespace(parser, SESSION_NAMESPACE)
     add_json(parser)
 
 
@@ -29,9 +30,9 @@ def run(args: Namespace) -> int:
 
     info = inspect(Path(args.bag), window_of(args))
     scene = open_session_scene(args.bag, args.scene)
-    mapped = mapping_of(info.session.path, args.mapping)
+    mapped = mapping_of(info.session.path, args.mapping, namespace=args.namespace)
     values = as_json(info, scene, mapped, strokes_of(info.session.path, mapped))
-    values["wiring"] = wiring_of(info.session.path, args.scene, args.mapping, window_of(args))
+    values["wiring"] = wiring_of(info.session.path, args.scene, args.mapping, window_of(args), args.namespace)
     print_result(args.json, values, as_text(info, scene, values))
     return 0
 

@@ -134,9 +134,9 @@ class CommandParser(ArgumentParser):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return the exit code; without `argv` that of the process, which has nothing else to do."""
-    # New objects between two searches for garbage. Modules hold none, and looking through those of numba again and again takes
-    # 0.05 s, once more at the exit 0.09 s: hence also gc.freeze().
+    """Run one command and return the exit code. `argv` is None in the console script, whose process then ends."""
+    # New objects between two garbage collections. Collecting among numba's modules, which hold no garbage, takes 0.05 s, and
+    # 0.09 s at the exit, which gc.freeze() avoids.
     collect_after = 300_000
     if argv is not None:
         return _main(argv)

@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .arguments import SESSION, add_json, add_session, refuse_given, window_of
+from .arguments import SESSION, SESSION_NAMESPACE, add_json, add_namespace, add_session, refuse_given, window_of
 
 if TYPE_CHECKING:
     from ..offline.commissioning import Commissioning
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--check", metavar="BAG", help=f"check how the sensors of a session are wired: {SESSION}")
     add_session(parser, params=False)
+    add_namespace(parser, SESSION_NAMESPACE)
     parser.add_argument("--out", type=Path, metavar="FILE", help="with --check: write the proposed mapping")
     add_json(parser)
 
@@ -24,7 +25,7 @@ def run(args: Namespace) -> int:
     if args.check is not None:
         return _check(args)
     remedy = "only with --check BAG; without it, the default mapping is printed. Add --check BAG."
-    refuse_given(args, remedy, "scene", "mapping", "out", "duration", "json")
+    refuse_given(args, remedy, "scene", "mapping", "namespace", "out", "duration", "json")
     from ..messages.topic_table import DEFAULT_FILE
 
     sys.stdout.write(DEFAULT_FILE.read_text(encoding="utf-8"))
@@ -39,7 +40,8 @@ def _check(args: Namespace) -> int:
 
     if args.out is not None:
         check_target(args.out, [Path(args.check)])
-    found = commission(args.check, open_session_scene(args.check, args.scene), args.mapping, window_of(args))
+    scene = open_session_scene(args.check, args.scene)
+    found = commission(args.check, scene, args.mapping, window_of(args), namespace=args.namespace)
     text = whole_text(found.document) if found.has_proposal else ""
     if args.out is not None and text:
         write_atomic(args.out, text)

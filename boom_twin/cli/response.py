@@ -23,6 +23,7 @@ from .output import open_scene, print_result, warn
 if TYPE_CHECKING:
     from ..analysis.frequency_response import FrequencyResponse
 
+NO_MODES = "natural frequencies: none: nothing in this model can vibrate"
 Flags = NDArray[np.bool_]
 LOW, HIGH, POINTS, RATES = 0.05, 30.0, 300, (0.2, 1.2, 201)
 
@@ -120,7 +121,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     from ..plots.analysis import response_picture
 
     modes_sought = 40  # natural frequencies that are looked for within the band
-    beside, sharp = 1.0 + 1e-6, 3.0  # a peak `sharp` times as high as at `beside` times its frequency is not damped
+    beside, sharp = 1.0 + 1e-6, 3.0  # undamped: at `beside` times the frequency, the peak is lower by the factor `sharp`
 
     if not 0.0 < args.low < args.high < float("inf"):
         raise UsageError(f"--from {args.low:g} --to {args.high:g}: both must be above 0 Hz. Give the lower one first.")
@@ -151,7 +152,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     return Answer(
         "response",
         values | {name: column for name, column in columns.items() if name != "frequency_Hz"},
-        [title, "", *_resonances(result, static, natural, bounded)],
+        [title, "", *_resonances(result, static, natural, bounded), *([] if len(rest.frequencies) else [NO_MODES])],
         columns,
         lambda path: response_picture(path, title, unit, result, natural),
         doubts,

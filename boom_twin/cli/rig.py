@@ -153,7 +153,7 @@ def run(args: Namespace) -> int:
         wanted = {Stream.STROKES, Stream.PRESSURES, *recorded, *(Stream(KINDS[each].beside or each) for each in recorded)}
         there = {stream: rows for stream, rows in readings.items() if stream in wanted}
         write_samples(building, samples_in_rows(session.stamps, there, session.angle_stamps), there, notes)
-        # not the boom that was simulated: what a twin is to assume
+        # the scene that a twin assumes, not the simulated boom
         own = _mapping_text(places, cylinders)
         metadata = SessionMetadata(__version__, assumed.text, mapping=own, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)
         metadata.write(building)

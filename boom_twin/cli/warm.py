@@ -1,4 +1,4 @@
-"""``boom_twin warm``: compile the kernels beforehand, or remove what was compiled."""
+"""``boom_twin warm``: compile the kernels beforehand, or remove the compiled kernels."""
 
 from __future__ import annotations
 

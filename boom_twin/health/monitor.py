@@ -11,7 +11,7 @@ from ..config.settings import Settings
 from ..deviation.named_faults import FaultyBoom
 from ..scene.edit import loaded
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, SENSORS, Alarm, Array, Health, Mount, Place, Stream, StrokeReading
+from ..types import NANO, SECOND, SENSORS, Alarm, Array, Channel, Health, Mount, Place, Stream, StrokeReading
 from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows
 from .deviations import SIGMAS, DeviationMonitor
 from .fault_twins import FaultTwins
@@ -44,7 +44,7 @@ class HealthMonitor:
         Channels of every stream.
     reads : StrokeReading
         Quantity that drives the model. Angles that drive it are not compared with the prediction.
-    places : mapping of str to Place
+    places, declared : mapping of str to Place, to Channel
         See `boom_twin.Twin`.
 
     Attributes
@@ -64,6 +64,7 @@ class HealthMonitor:
         channels: Mapping[Stream, tuple[str, ...]],
         reads: StrokeReading,
         places: Mapping[str, Place],
+        declared: Mapping[str, Channel],
     ) -> None:
         self._reads, self._drive = reads, reads.stream
         self.fault_twins: FaultTwins | None = None
@@ -82,7 +83,8 @@ class HealthMonitor:
         self._lags = LagMonitor(self._drive)
         compared = [stream for stream in SIGMAS if stream is not self._drive]
         self._deviations = {stream: DeviationMonitor(stream, scene, settings) for stream in compared}
-        self._wiring, self._load = WiringMonitor(scene, reads, mounts, places), TipLoadMonitor(settings.tip_load_limit)
+        self._wiring = WiringMonitor(scene, reads, mounts, places, declared)
+        self._load = TipLoadMonitor(settings.tip_load_limit)
         self._told = 0
         self.begin()
 

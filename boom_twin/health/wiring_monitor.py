@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.schema import Scene
-from ..types import SENSORS, Alarm, Array, Mount, Place, Ranked, Stream, StrokeReading, channels_of, streams_of
+from ..types import SENSORS, Alarm, Array, Channel, Mount, Place, Ranked, Stream, StrokeReading, channels_of, streams_of
 from ..wiring.check import Checked, channel_name, check, likely
-from ..wiring.readings import Channel, RestModel, Series, Window, is_checked
+from ..wiring.hypotheses import as_read
+from ..wiring.readings import RestModel, Series, Window, is_checked
 from .alarms import UNKNOWN
 from .blocks import Block
 from .sensor_check import Flags, Readings
@@ -42,9 +43,18 @@ class WiringMonitor:
         Mounts of the angle sensors.
     places : mapping of str to Place
         See `boom_twin.Twin`.
+    declared : mapping of str to Channel
+        See `boom_twin.Twin`. An alarm names the unit, sign and zero that the mapping should have.
     """
 
-    def __init__(self, scene: Scene, reads: StrokeReading, mounts: Sequence[Mount | None], places: Mapping[str, Place]) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        reads: StrokeReading,
+        mounts: Sequence[Mount | None],
+        places: Mapping[str, Place],
+        declared: Mapping[str, Channel],
+    ) -> None:
         self._scene, self._reads, self._places = scene, reads, places
         channels = channels_of(len(scene.joints), streams_of(places))
         self._channels = {stream: names for stream, names in channels.items() if names and is_checked(stream)}
@@ -52,7 +62,10 @@ class WiringMonitor:
         ends = np.cumsum([len(names) for names in self._channels.values()]).tolist()
         self._own = {s: slice(end - len(self._channels[s]), end) for s, end in zip(self._channels, ends, strict=True)}
         self._declared = {
-            stream: [Channel(name, kind.unit, turned=places.get(kind.stem, Place()).turned) for name in self._channels[stream]]
+            stream: [
+                declared.get(name, Channel(name, kind.unit))._replace(turned=places.get(kind.stem, Place()).turned)
+                for name in self._channels[stream]
+            ]
             for stream, kind in SENSORS.items()
             if stream in self._channels
         }
@@ -147,14 +160,16 @@ class WiringMonitor:
             self._search = self._age + DELAY, self._worker.submit(check, RestModel(*boom), self._declared, window)
 
     def _window(self) -> Window:
-        """Return the means of all blocks since the start by stream and channel; NaN for sensors that have stopped."""
+        """Return the means of all blocks since the start, in the units of the messages; NaN for sensors that have stopped."""
         found: dict[Stream, dict[str, Series]] = {}
         for stream, names in self._channels.items():
             rows = [(start, means[stream]) for start, means in self._blocks if stream in means]
             stamps = np.array([start for start, _ in rows], np.int64)
             columns = np.array([values for _, values in rows]).reshape(len(rows), len(names)).T
             columns[self._silent[stream]] = np.nan
-            found[stream] = {name: Series(stamps, column) for name, column in zip(names, columns, strict=True)}
+            units, declared = SENSORS[stream].units, self._declared[stream]
+            pairs = zip(declared, columns, strict=True)
+            found[stream] = {each.name: Series(stamps, as_read(each, units, column)) for each, column in pairs}
         return found
 
     def _reported(self, found: Checked, end: int) -> list[Alarm]:

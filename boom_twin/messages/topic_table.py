@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, WrapValidator
 from ..config.settings import Settings
 from ..config.yaml_text import read_plain
 from ..errors import UsageError
-from ..types import GIVE, NUMBER, SECOND, SENSORS, Mount, Place, Stream, StrokeReading, sensor_kind, streams_of
+from ..types import GIVE, NUMBER, SECOND, SENSORS, Channel, Mount, Place, Stream, StrokeReading, sensor_kind, streams_of
 
 if TYPE_CHECKING:
     from ..scene.schema import Joint
@@ -291,6 +291,12 @@ class Topics(_Entry):
     def mounts(self, joints: int) -> list[Mount | None]:
         """Return the mounts of a boom's inclinometers, one entry for each joint; None is an encoder."""
         return [sensor.absolute for sensor in self.sensors_of(Stream.ANGLES, joints).values()]
+
+    def sensing(self, joints: int) -> dict[str, Any]:
+        """Return the arguments of `boom_twin.Twin` that describe the sensors."""
+        read = {name: Channel(name, each.unit, each.sign, each.zero, each.scale) for name, each in self.sensors.items()}
+        found: dict[str, Any] = {"reads": self.stroke_reading, "mounts": self.mounts(joints), "absent": self.absent}
+        return found | {"places": self.places, "lagging": self.lagging, "declared": read}
 
 
 @cache

@@ -1,4 +1,4 @@
 """The live page: server, viewers, protocol."""
 
 PORT = 8420
-ACTS = ("mark", "acknowledge")  # what viewers may do, if it is permitted
+ACTS = ("mark", "acknowledge")  # actions of viewers, each permitted at start or not

@@ -24,10 +24,10 @@ from ..scene.load import SceneSource
 from ..scene.schema import Scene
 from ..twin.blocks import CODES, SampleBlock
 from ..twin.twin import Twin
-from ..types import SENSORS, Array, Place, Stream, StrokeReading
+from ..types import SENSORS, Array, Channel, Place, Stream, StrokeReading
 from ..wiring.check import ABSENT, STROKES_ALONE, Checked, Verdict, check, finding, likely, reading
 from ..wiring.hypotheses import SLACK, si
-from ..wiring.readings import Channel, Lag, RestModel, Series, Window, is_checked, lag_of
+from ..wiring.readings import Lag, RestModel, Series, Window, is_checked, lag_of
 from .inputs import of_another_boom
 from .session_samples import SessionSamples, decoder_of
 
@@ -64,11 +64,13 @@ class Commissioning:
         return bool(self.late) or bool(self.absent) or any(verdict.is_sure for verdict in self.wrong)
 
 
-def wiring_of(bag: Path, scene: SceneSource | SessionScene, mapping: str | Path | None, window: TimeWindow) -> str:
+def wiring_of(
+    bag: Path, scene: SceneSource | SessionScene, mapping: str | Path | None, window: TimeWindow, namespace: str = ""
+) -> str:
     """Return one line on how the sensors of a session are wired, by its first `LOOK` seconds."""
     duration = LOOK if window.duration is None else min(LOOK, window.duration)
     try:
-        found = commission(bag, scene, mapping, TimeWindow(window.start, duration), with_lags=False)
+        found = commission(bag, scene, mapping, TimeWindow(window.start, duration), with_lags=False, namespace=namespace)
     except (BagError, UsageError) as error:
         return f"not checked: {str(error).splitlines()[0].rstrip('.')}"
     absent = [f"{channel} is {ABSENT}" for channel in found.absent]
@@ -99,11 +101,12 @@ def commission(
     mapping: str | Path | None = None,
     window: TimeWindow = WHOLE,
     with_lags: bool = True,
+    namespace: str = "",
 ) -> Commissioning:
     """Check how the sensors of a session are wired.
 
     Scene and mapping are by default those of the session, else those of the package. `window` is the part of the session that
-    is read. `with_lags`: the twin runs over the session, for the lags of the streams.
+    is read. `with_lags`: the twin runs over the session, for the lags of the streams. `namespace` is that of the node.
 
     Raise BagError if the session cannot be read, is of another boom, or its messages do not name all cylinders; UsageError if
     scene or mapping have faults.
@@ -112,7 +115,7 @@ def commission(
     session = scan(Path(bag))
     own, given = scene_of(session.path, scene), None if mapping is None else Path(mapping)
     joints = len(own.scene.joints)
-    mapped, document = mapping_of(session.path, given, joints), _mapping_content(session.path, given)
+    mapped, document = mapping_of(session.path, given, joints, namespace), _mapping_content(session.path, given)
     reads = strokes_of(session.path, mapped).reading
     if reads is StrokeReading.ANGLE:
         raise BagError(f"{session.path}: has `drive: angles`. The check needs the strokes of all cylinders; it cannot be made.")
@@ -139,14 +142,13 @@ def commission(
         document.setdefault("sensors", {})[channel] = "none"
     lags: dict[Stream, Lag] = {}
     if with_lags and all(v.is_sure or not v.is_wrong for v in found.verdicts if v.stream is Stream.STROKES):
-        topics = mapping_from(document, mapped.source, joints).of_scene(own.scene.joints)
-        mounts = topics.mounts(joints)
-        sensing = topics.noise_of(settings), mounts, False, reads, topics.absent
-        twin = Twin(own.scene, *sensing, places=topics.places, lagging=topics.lagging)
+        topics = mapping_from(document, mapped.source, joints).in_namespace(namespace).of_scene(own.scene.joints)
+        boom, sensing = (own.scene, topics.noise_of(settings)), topics.sensing(joints) | {"reads": reads}
+        twin = Twin(*boom, **sensing)
         lags = _lags(twin, session, topics, window, found)
         near = [stream for stream, lag in lags.items() if abs(lag.lag) < most_lag and lag.sigma < math.inf]
         for _ in range(2):  # the second pass estimates lags of late streams only; the others give the time
-            twin = Twin(own.scene, *sensing, places=topics.places, lagging=dict.fromkeys([*topics.lagging, *near]))
+            twin = Twin(*boom, **sensing | {"lagging": dict.fromkeys([*topics.lagging, *near])})
             for block in _samples(session, topics, window, joints):
                 twin.take(block)
             lags |= {stream: Lag(clock.lag, clock.lag_sigma) for stream, clock in twin.clocks.items() if stream in lags}

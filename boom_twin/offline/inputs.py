@@ -89,10 +89,8 @@ class ReplayInputs:
 
     def twin(self, causes: bool = False) -> Twin:
         """Return a twin for the session, which names causes of faults if that is asked for."""
-        topics, reads = self.topics, self.strokes.reading
-        mounts, settings = topics.mounts(len(self.scene.joints)), topics.noise_of(self.settings)
-        given = self.scene, settings, mounts, self.health, reads, topics.absent
-        return Twin(*given, causes=causes, places=topics.places, lagging=topics.lagging)
+        sensing = self.topics.sensing(len(self.scene.joints)) | {"reads": self.strokes.reading}
+        return Twin(self.scene, self.topics.noise_of(self.settings), health=self.health, causes=causes, **sensing)
 
     def refuse_other_boom(self, health: Health) -> None:
         """Raise BagError if the wiring check says that the session is of another boom than the scene."""

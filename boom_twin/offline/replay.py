@@ -273,7 +273,7 @@ def _wiring_advice(given: ReplayInputs, options: ReplayOptions) -> str:
         return "Give names, units and zeros of the joints' sensors by --mapping."
     from .commissioning import wiring_of  # only a session without any usable stroke needs it
 
-    return f"Wiring: {wiring_of(given.session.path, given.kept, options.mapping, given.window)}."
+    return f"Wiring: {wiring_of(given.session.path, given.kept, options.mapping, given.window, options.namespace)}."
 
 
 def _explained(counts: Counter[str]) -> str:

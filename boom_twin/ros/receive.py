@@ -1,4 +1,4 @@
-"""Receive messages without rclpy's queues growing: turns of its executor, and a bounded queue of what arrived.
+"""Reception of messages without growing queues in rclpy: turns of its executor, and a bounded queue of messages.
 
 The executor puts messages into the queue within some microseconds. Between two of its turns, messages are read for a limited
 time. rclpy's events executor calls back once for every arrived message, in one row with services and timers. So messages are

@@ -62,7 +62,7 @@ def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
 
 
 def one_line(error: BaseException) -> str:
-    """Return the text of an error of rclpy without line breaks and without what its C parts append."""
+    """Return the text of an error of rclpy without line breaks and without the source place that its C parts append."""
     return " ".join(re.split(r", at \.?/", str(error))[0].split()).rstrip(".") or type(error).__name__
 
 
@@ -76,15 +76,15 @@ class Log:
         self._logger = node.get_logger()
 
     def info(self, line: str) -> None:
-        """Write a line on what goes as it should."""
+        """Log a line at level INFO."""
         self._logger.info(printable(line, keep=""))
 
     def warning(self, line: str) -> None:
-        """Write a line on what is not as it should be."""
+        """Log a line at level WARN."""
         self._logger.warning(printable(line, keep=""))
 
     def fatal(self, text: str) -> None:
-        """Write why the node cannot go on; line breaks stay."""
+        """Log the reason for the end of the node at level FATAL; line breaks stay."""
         self._logger.fatal(printable(text))
 
 
@@ -113,7 +113,7 @@ def node_name(endpoint: Any) -> str:
 
 
 class DiagnosticsPublisher:
-    """Publisher of the states of one node. `hardware_id` names what is diagnosed; empty: the node's name."""
+    """Publisher of the statuses of one node. `hardware_id` names the diagnosed machine; empty: the node's name."""
 
     def __init__(self, node: Node, topic: Topic, hardware_id: str = "") -> None:
         self._node, self._logger = node, Log(node)

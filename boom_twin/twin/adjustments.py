@@ -16,11 +16,11 @@ from ..types import GIVE, SECOND, SENSORS, Array, Change, Stream, StrokeReading
 from .blocks import CODES
 from .state import COUNT, FIRST, NOISE_REACH, NONE, ZEROS, Limits, Ring, TwinState, zeros_at
 
-SWAY = 0.5  # rad, by which an inclinometer that drives the model may be off its estimate at once while its section shakes
+SWAY = 0.5  # rad, largest deviation of an inclinometer that drives the model from its estimate, while its section vibrates
 
 
 def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Collection[str], reads: StrokeReading) -> Limits:
-    """Return the limits of the compiled update for `boom`, that of `scene`, and for its sensors."""
+    """Return the limits of the compiled update for the predictor `boom` of `scene` and its sensors."""
     channels = list(boom.channels.values())
     counts = np.array([len(names) for names in channels])
     far = NOISE_REACH * settings.variance(SENSORS[reads.stream]) ** 0.5
@@ -59,7 +59,7 @@ class SensorZeros:
         self.values: dict[str, float] = {}
 
     def put(self, stamp: int, values: Mapping[str, float]) -> bool:
-        """Set the zeros that hold from `stamp` (ns) on; return True if zeros of what drives the model change.
+        """Set the zeros that hold from `stamp` (ns) on; return True if zeros of the driving sensors change.
 
         Samples with earlier stamps keep the zeros that held then.
         """
@@ -82,13 +82,13 @@ class SensorZeros:
         state.zero_sets[0] = 1
 
     def of_drive(self, stamp: int) -> Array:
-        """Return the zeros to subtract from what drives the model at `stamp` (ns), m or rad, shape (n,)."""
+        """Return the zeros of the sensors that drive the model at `stamp` (ns), m or rad, shape (n,)."""
         return self._state.zeros[zeros_at(self._state, stamp), CODES[self._drive], : len(self._channels[self._drive])]
 
 
-FEWEST_RESIDUALS = 5  # readings that make a mean
+FEWEST_RESIDUALS = 5  # least number of residuals for a mean
 WHOLE = {kind.stem: kind.channels(0) for kind in SENSORS.values() if kind.ends and not (kind.beside or kind.gives)}
-"""Sensors with a zero for each of their channels; all others have one for each joint."""
+"""Channels of the sensors whose zeros are set together, by sensor; other sensors are set joint by joint."""
 
 
 class ResidualBuffer:

@@ -56,20 +56,20 @@ class BlockUpdate:
         is_reporting: bool = True,
     ) -> None:
         self._boom, self.limits, self._state, self._channels = boom, limits, state, channels
-        self._judge, self._told_counts = judge, counts
+        self._judge, self._event_counts = judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
         drives = CODES[Stream.STROKES], limits.drive
         self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code not in drives]
         self._capacity, sizes = capacity, (2 * capacity, self._joints, boom.width, boom.stations, limits.channels)
         self._found: UpdateOutput = new_output(*sizes)
-        self._begin, self._told = (0, 0), (0, 0)
+        self._begin, self._passed = (0, 0), (0, 0)
         self._drawn: dict[int, Drawn] = {}  # by row of a prediction
         self._health: dict[int, Health] = {}  # by row of a sample, as events
         self._events: dict[int, tuple[str, ...]] = {}
-        self._due: Run | None = None  # whose newest slot is still to be judged
-        self._begins_health = False  # before it is told anything
+        self._due: Run | None = None  # run whose newest slot is still to be judged
+        self._begins_health = False  # the health monitor restarts before the next rows are passed to it
         self._nothing = None if is_reporting else self.no_rows(0, REGULAR)
-        self._held: _Held | None  # what the compiled code takes with every call
+        self._held: _Held | None  # compiled code and arguments of every call
 
     @property
     def limits(self) -> Limits:
@@ -81,11 +81,11 @@ class BlockUpdate:
         self._limits, self._held = limits, None
 
     def begin_health(self) -> None:
-        """Restart the health monitor with the next data; what was found up to now is not passed to it."""
-        self._told, self._due, self._begins_health = tuple(self._found.counts.tolist()), None, True
+        """Restart the health monitor with the next rows; present rows are not passed to it."""
+        self._passed, self._due, self._begins_health = tuple(self._found.counts.tolist()), None, True
 
     def advance(self, run: Run | None, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
-        """Take regular samples of a block of at most `capacity`; return why that ended, see `DONE`, and how many were taken.
+        """Take regular samples of a block of at most `capacity`; return the reason for the end, see `DONE`, and their number.
 
         `run` is the present one. `trusted`: the block has one sample, which `SampleTaker` has checked.
         `rows` or `report` return the results.
@@ -98,7 +98,7 @@ class BlockUpdate:
             reason, row = advance(*arguments, *block, row, trusted, found)
             if reason != LOOK:
                 break
-            self._look_around(run, row)
+            self._note_slot(run, row)
             row += 1
             if row == size:  # last sample: the caller decides when health is judged
                 reason = DONE
@@ -109,7 +109,7 @@ class BlockUpdate:
 
     def _count_unmatched(self) -> None:
         if unmatched := int(self._state.clock[UNMATCHED]):
-            self._told_counts["unmatched"] += unmatched
+            self._event_counts["unmatched"] += unmatched
             self._state.clock[UNMATCHED] = 0
 
     def _hold(self) -> _Held:
@@ -126,23 +126,23 @@ class BlockUpdate:
         self._begin = tuple(self._found.counts.tolist())
         self._drawn, self._health, self._events = {}, {}, {}
         if max(self._begin) > self._capacity:
-            self._tell_health()
+            self._pass_to_health()
             self._found.counts[:] = 0
-            self._begin = self._told = 0, 0
+            self._begin = self._passed = 0, 0
 
-    def _look_around(self, run: Run | None, row: int) -> None:
+    def _note_slot(self, run: Run | None, row: int) -> None:
         clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
         if clock[IS_DEFLECTED]:
             self._events[row] = ("deflected",)
-            self._told_counts["deflected"] += 1
+            self._event_counts["deflected"] += 1
         if not clock[BEGINS_SLOT]:
             return
         if self._nothing is None:
             self._drawn[at] = self._boom.drawn
         if self._judge is None:
             return
-        if clock[IS_DEFLECTED]:  # what the model is not valid for accuses no sensor
-            self._told = tuple(self._found.counts.tolist())
+        if clock[IS_DEFLECTED]:  # outside the model's validity, residuals are no faults of sensors
+            self._passed = tuple(self._found.counts.tolist())
         else:
             self._due = run
 
@@ -159,7 +159,7 @@ class BlockUpdate:
         run, self._due = self._due, None
         if run is None or self._judge is None:
             return None
-        self._tell_health(run.newest // SLOT * SLOT)
+        self._pass_to_health(run.newest // SLOT * SLOT)
         health = self._judge.judge(run.newest, self._boom.tip_loads, lambda: self._boom.tip_sigmas)
         self._boom.leave_out(self._judge.suspected, self._judge.failing_strokes, self._judge.wrong_angles)
         self._boom.allow_for(self._judge.faulty_booms, self._judge.drive_lag)
@@ -169,8 +169,8 @@ class BlockUpdate:
         if (health := self.judge()) is not None:
             self._health[row] = health
 
-    def _tell_health(self, end: float = inf) -> None:
-        """Pass the results since the last call to the health monitor, but those from `end` (ns) on."""
+    def _pass_to_health(self, end: float = inf) -> None:
+        """Pass the rows since the last call, with stamps before `end` (ns), to the health monitor."""
         found = self._found
         if self._judge is None:
             return
@@ -179,9 +179,9 @@ class BlockUpdate:
             self._begins_health = False
         counts = found.counts.tolist()
         for which, stamps in enumerate((found.stamps, found.residual_stamps)):
-            while counts[which] > self._told[which] and stamps[counts[which] - 1] >= end:
+            while counts[which] > self._passed[which] and stamps[counts[which] - 1] >= end:
                 counts[which] -= 1
-        (predicted, compared), self._told = self._told, (counts[0], counts[1])
+        (predicted, compared), self._passed = self._passed, (counts[0], counts[1])
         if counts[0] > predicted:
             own = slice(predicted, counts[0])
             variances = found.rows[own, self._boom.places.variances].copy()

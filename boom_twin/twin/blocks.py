@@ -57,24 +57,13 @@ class PredictionBlock(NamedTuple):
     def one(self, row: int) -> Prediction:
         """Return the prediction of a row; its arrays are views."""
         outline = self.outlines.get(row)
-        return Prediction(
-            stamp=int(self.stamps[row]),
-            tip_position=self.tip_position[row],
-            tip_displacement=self.tip_displacement[row],
-            tip_velocity=self.tip_velocity[row],
-            tip_acceleration=self.tip_acceleration[row],
-            tip_angle=float(self.tip_angle[row]),
-            tip_angular_velocity=float(self.tip_angular_velocity[row]),
-            tip_angular_acceleration=float(self.tip_angular_acceleration[row]),
-            joints=self.joints[row],
-            strokes=self.strokes[row],
-            cylinder_forces=self.cylinder_forces[row],
-            shape=None if outline is None else outline.shape,
-            undeflected=None if outline is None else outline.undeflected,
-            pins=None if outline is None else outline.pins,
-            clearances=self.clearances[row],
-            moments=self.moments[row],
-        )
+        drawn = {} if outline is None else {name: getattr(outline, name) for name in Outline.__slots__}
+        numbers = {name: getattr(self, name)[row] for name in PREDICTED}
+        return Prediction(int(self.stamps[row]), **numbers, **drawn)
+
+
+PREDICTED = tuple(name for name in PredictionBlock._fields if name not in ("at", "stamps", "outlines"))
+"""Fields of a `Prediction` that are columns of a `PredictionBlock`."""
 
 
 class _Columns:
@@ -163,7 +152,7 @@ class ReportBlock(NamedTuple):
     notes: dict[int, Note]  # by row of the sample, in their order; none of a regular sample
 
     def reports(self, joints: int) -> list[Report]:
-        """Return one report for every sample, of a boom with so many joints."""
+        """Return one report for every sample of a boom with `joints` joints."""
         channels = channels_of(joints)
         found: list[list[Residuals]] = [[] for _ in self.stamps]
         rows = zip(*(field.tolist() for field in self.residuals[:3]), self.residuals.values, self.residuals.sigmas, strict=True)
@@ -191,7 +180,7 @@ class ReportBlock(NamedTuple):
 
 
 def block_of(samples: list[Sample], joints: int) -> SampleBlock:
-    """Return samples as a block, of a boom with so many joints."""
+    """Return the block of samples of a boom with `joints` joints."""
     width = max(len(names) for names in channels_of(joints).values())
     values = np.full((len(samples), width), np.nan)
     for row, sample in zip(values, samples, strict=True):
@@ -201,7 +190,7 @@ def block_of(samples: list[Sample], joints: int) -> SampleBlock:
 
 
 def samples_in(block: SampleBlock, joints: int) -> list[Sample]:
-    """Return the samples of a block, of a boom with so many joints; their values are views."""
+    """Return the samples of a block of a boom with `joints` joints; their values are views."""
     counts = [len(names) for names in channels_of(joints).values()]
     rows = zip(block.streams.tolist(), block.stamps.tolist(), block.values, strict=True)
     return [Sample(STREAMS[code], stamp, values[: counts[code]]) for code, stamp, values in rows]

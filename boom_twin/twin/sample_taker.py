@@ -23,10 +23,12 @@ from ..scene.load import SceneSource, as_scene
 from ..types import (
     LIMIT,
     NANO,
+    NO_CHANNELS,
     NO_PLACES,
     SECOND,
     Array,
     Change,
+    Channel,
     Mount,
     Place,
     Sample,
@@ -76,6 +78,7 @@ class SampleTaker:
         places: Mapping[str, Place] = NO_PLACES,
         lagging: Collection[Stream] = (),
         is_follower: bool = False,
+        declared: Mapping[str, Channel] = NO_CHANNELS,
     ) -> None:
         self.reads, self._drive, self.absent, scene = reads, reads.stream, frozenset(absent), as_scene(scene)
         if not isinstance(settings, Settings | None):
@@ -83,12 +86,12 @@ class SampleTaker:
         self.scene, self.settings, self._health = scene, settings or Settings(), health
         self.counts: Counter[str] = Counter()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
-        self.places, self.lagging = dict(places), tuple(lagging)
+        self.places, self.lagging, self._declared = dict(places), tuple(lagging), declared
         self._channels = channels_of(len(scene.joints), streams_of(self.places))
         self.absent |= {name for name in self._channels[Stream.MOMENTS] if name not in self.places}
         self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
         self._widths = [len(names) for names in self._channels.values()]
-        self._edge = SampleCheck(self._channels, self._drive)
+        self._sample_check = SampleCheck(self._channels, self._drive)
         self.requests = Requests(self.settings)
         self._doubted, self._is_follower = frozenset(doubted), is_follower
         self._room = FOLLOWER_ROOM if is_follower else ROOM
@@ -116,7 +119,7 @@ class SampleTaker:
         return self.judge.suspected, self.judge.failing_strokes
 
     def doubt(self, channels: Collection[str]) -> None:
-        """Let the zeros of these sensors drift by any amount, and those of all others as they do."""
+        """Let the zeros of these sensors drift without bound, and those of the others by their settings."""
         self._doubted = frozenset(channels)
         self._boom.sensors.doubt(self._doubted)
 
@@ -124,7 +127,7 @@ class SampleTaker:
         self._boom.leave_out(masked, strokes, np.zeros_like(strokes))
 
     def _restart(self) -> None:
-        self._begin_anew()
+        self._end_run()
         self._line = StampCheck(self.settings, self._state, CODES[self._drive])
         self._state.newest[:], self._state.usual[:] = NONE, 0.0
         self._state.waiting.bounds[:] = 0
@@ -136,7 +139,8 @@ class SampleTaker:
         boom.sensors.doubt(self._doubted)
         judge: HealthMonitor | None = None
         if self._health:
-            judge = HealthMonitor(scene, settings, self.mounts, self.absent, boom.channels, self.reads, self.places)
+            sensors = self.mounts, self.absent, boom.channels, self.reads, self.places, self._declared
+            judge = HealthMonitor(scene, settings, *sensors)
             judge.fault_twins = self._fault_twins
         self._boom, self.plan, self.judge = boom, boom.plan, judge
         limits = limits_of(self.scene, boom, settings, self.absent, self.reads)
@@ -162,19 +166,19 @@ class SampleTaker:
             from_rest |= self._zeros.put(stamp, asked.zeros)
         if (from_rest or "load" in events) and self._run is not None:
             events += [] if events else ["reset"]
-            self._begin_anew_at(stamp)
+            self._end_run_at(stamp)
         if "load" in events:
             lags = self._boom.filters.lags
             self._make_model()
             self._boom.filters.lags[:] = lags
         return events
 
-    def _begin_anew_at(self, stamp: int) -> None:
-        """Start from rest with the strokes of `stamp` (ns), though the boom may be moving; measured samples since then wait."""
-        self._begin_anew()
+    def _end_run_at(self, stamp: int) -> None:
+        """End the run; the next one starts with the strokes of `stamp` (ns). Measured samples from then on still wait."""
+        self._end_run()
         drop_waiting(self._state, NONE, stamp - 1)
 
-    def _begin_anew(self) -> None:
+    def _end_run(self) -> None:
         self._run = None
         self._state.clock[NEWEST] = NONE
         self._state.past.bounds[:] = 0
@@ -188,8 +192,8 @@ class SampleTaker:
         reason, _ = self._compiled.advance(self._run, one, trusted)
         return reason
 
-    def _look_at(self, sample: Sample) -> ReportBlock:
-        """Take a sample that may be irregular. It is copied, since it may be held and the caller's arrays may change."""
+    def _decide(self, sample: Sample) -> ReportBlock:
+        """Follow, compare or refuse a sample that may be irregular. It is copied, since the caller's arrays may change."""
         self._compiled.make_room()
         sample = replace(sample, values=sample.values.copy())
         complete = self._is_complete(sample)
@@ -225,7 +229,7 @@ class SampleTaker:
         return self._follow(sample, values, complete, [verdict.event] if verdict.event else [])
 
     def _zeroed(self, sample: Sample) -> Array:
-        """Return what drives the model less its zeros; of inclinometers, the turn next to what is expected."""
+        """Return strokes or angles that drive the model, less their zeros; of inclinometers, the turn next to the estimate."""
         values = sample.values - self._zeros.of_drive(sample.stamp)
         if self._run is None:
             return values
@@ -273,7 +277,7 @@ class SampleTaker:
         before, rates = self._state.strokes, self._boom.speeds
         taken, oddities = run.checked(sample.stamp, sample.values, before, estimate, rates, self._compiled.limits)
         if run.must_restart and np.isfinite(sample.values).all():
-            self._begin_anew_at(sample.stamp)
+            self._end_run_at(sample.stamp)
             return self._follow(sample, sample.values, True, [*events, "stroke elsewhere"])
         run.is_predicted = True
         events += oddities
@@ -297,7 +301,7 @@ class SampleTaker:
             return self._refuse(sample, "duplicate" if span == 0.0 else "late")
         if run is not None and abs(sample.stamp - run.newest) * NANO > self.settings.restart_gap:
             return self._refuse(sample, "leap")  # no strokes come at that time
-        if span < 0.0:  # time was set back, as in a looped bag: what waits is of the time before
+        if span < 0.0:  # time was set back, as in a looped bag: waiting samples are of the time before
             state.clock[UNMATCHED] += drop_waiting(state, sample.stamp, -NONE, stream)
             state.newest[stream] = NONE
         return self._compare(sample, complete)
@@ -313,7 +317,7 @@ class SampleTaker:
         return self._compiled.rows(np.array([sample.stamp]), events)
 
     def _refuse(self, sample: Sample, *events: str, status: str = "ok", is_noted: bool = False) -> ReportBlock:
-        """Return the report of a sample whose values are not used; its stamp is, if `is_noted`."""
+        """Return the report of a sample whose values are not used. If `is_noted`, its stamp is used."""
         self.counts.update(events)
         return self._compiled.no_rows(sample.stamp, Note(is_noted, events, status))
 

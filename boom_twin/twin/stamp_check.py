@@ -16,7 +16,7 @@ from ..types import NANO, SECOND, Array, Sample
 from .run import Run
 from .state import BESIDE, NONE, SHORTEST_STEP, USUAL_STEP, Limits, TwinState, is_next, longest_step, note_stamp
 
-EARLY_STEP = 8.0  # usual intervals, longest step ahead that is accepted at once if the strokes are as expected
+EARLY_STEP = 8.0  # usual intervals, longest step ahead that needs no confirmation if the strokes are as expected
 SECOND_LINE = 1_000_000_000  # ns after a stray stamp in which another line must be confirmed for the setting `gap`
 SURPRISE = 0.1  # tolerance of strokes that go on: share of the fastest cylinder's travel in a usual interval
 
@@ -75,7 +75,7 @@ class StampCheck:
             self._state.clock[BESIDE], self._strayed = 0, stamp
 
     def note(self, sample: Sample, limits: Limits) -> None:
-        """Note a sample beside the line. Strokes out of a cylinder's reach from those before begin a line of their own."""
+        """Add a sample to the other line. Strokes that no cylinder could have reached since then begin another line."""
         other, is_open = self._other, bool(self._state.clock[BESIDE])
         follows = other is not None and 0 < sample.stamp - other.stamp <= self.longest
         if follows and is_open and other is not None:

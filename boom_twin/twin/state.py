@@ -1,7 +1,7 @@
 """State of the twin as arrays (stamps, expected readings, waiting samples, zeros), and the rules of a regular sample by it.
 
-The compiled update applies the rules to every sample; `boom_twin.twin.stamp_check` and `boom_twin.twin.run` apply them as
-Python to irregular samples.
+The compiled update applies the rules to every sample. `boom_twin.twin.stamp_check` and `boom_twin.twin.run` apply them to
+irregular samples, as Python.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 NONE = -(2**62)  # no stamp yet, ns
-WAITING = 4096  # most samples that wait for a stroke
-ZEROS = 16  # sets of zeros that late samples may still need
+WAITING = 4096  # largest number of samples that wait for a stroke
+ZEROS = 16  # sets of zeros that are kept for late samples
 SLOT = 100_000_000  # ns; the first prediction in each has an outline, and health is judged with it
 
 NEWEST, CHECKED, TRUSTED, OTHERS, BESIDE, IN_SLOT, UNMATCHED, STATUS, BEGINS_SLOT, IS_DEFLECTED = range(10)  # of `clock`
@@ -31,8 +31,8 @@ FIRST, COUNT = range(2)  # of a ring
 class Room(NamedTuple):
     """Rows of a twin's buffers.
 
-    expected : expected readings of the last `SPAN`. recent : residuals that the zero of a sensor may be found from. samples :
-    samples that one call of the compiled update takes at most.
+    expected : expected readings of the last `SPAN`. recent : residuals for the zero of a sensor, see `ResidualBuffer`.
+    samples : largest number of samples in one call of the compiled update.
     """
 
     expected: int = 16_384
@@ -64,13 +64,13 @@ class TwinState(NamedTuple):
     newest: Integers  # (s,), stamp of the newest sample of every stream, ns; NONE before the first
     usual: Array  # (s,), time from one sample to the next, ns; 0 while unknown
     strokes: Array  # (n,), newest strokes or angles that drive the model, less their zeros, m or rad; NaN where missing
-    taken: Array  # (n,), the same as the model is to take them
+    taken: Array  # (n,), the same without implausible ones, which are NaN: input of the model
     past: Ring  # expected readings (c,), their deviations and the strokes, of the last `SPAN`
     waiting: Ring  # measured samples that wait for a stroke, by stamp and stream
     recent: Ring  # measured less expected, without any zero
     zeros_since: Integers  # (ZEROS,)
-    zeros: Array  # (ZEROS, s, w), what sensors read too much from a stamp on
-    zero_sets: Integers  # (1,), how many
+    zeros: Array  # (ZEROS, s, w), zeros to subtract from readings, valid from a stamp on
+    zero_sets: Integers  # (1,), number of sets
 
 
 @by_reference
@@ -79,17 +79,17 @@ class Limits(NamedTuple):
 
     gap: int  # ns
     drive: int  # code of the stream that drives the model, of strokes (m) or angles (rad)
-    far: float  # by which its readings may be off their estimate at once
-    rate: float  # of the fastest, per s
+    far: float  # largest deviation of its readings from their estimate without motion, m or rad
+    rate: float  # largest rate of its readings, m/s or rad/s
     shortest: Array  # (n,), least reading that there can be
     longest: Array  # (n,), greatest
-    turns: Flags  # (n,), whether they may be whole turns off
-    valid: float  # m, how far the tip may be from the undeformed boom's
+    turns: Flags  # (n,), True if readings are known up to whole turns
+    valid: float  # m, largest deflection of the tip for which the model is valid
     gravity: Array  # (2,), m/s^2
-    absolute: Flags  # (n,), whether the angle sensor of a joint is an inclinometer
+    absolute: Flags  # (n,), True if the angle sensor of a joint is an inclinometer
     absent: Flags  # (c,), measured channels without a sensor
     first: Integers  # (s,), first column of every stream among the measured channels
-    channels: Integers  # (s,), how many it has; 0 if it is not used
+    channels: Integers  # (s,), number of channels of every stream; 0 if it is not used
 
 
 @by_reference
@@ -178,7 +178,7 @@ def zeros_at(state, stamp):
 
 
 SHORTEST_STEP = 20_000  # ns from one stroke sample of a rig to the next, at least
-USUAL_STEP = 1.75  # usual intervals; a longer one is looked at
+USUAL_STEP = 1.75  # usual intervals, largest step of a stamp that is on time
 SMOOTHING = 0.05  # weight of the newest interval in the usual one
 NOISE_REACH = 8.0  # standard deviations of a stroke's noise
 
@@ -216,13 +216,13 @@ def note_stamp(state, stream, stamp):
 
 @inner
 def reach_of_strokes(far, rate, span):
-    """Return how far (m) a stroke may be off its estimate `span` (ns) after the last check."""
+    """Return the largest plausible deviation (m) of a stroke from its estimate, `span` (ns) after the last check."""
     return far + rate * (span * NANO)
 
 
 @inner
 def are_strokes_regular(estimates, limits, state, stamp, values):
-    """Return True if strokes, or angles that drive the model, are on time, complete and within reach; write them to `state`."""
+    """Return True if strokes, or angles that drive the model, are on time, complete and plausible; then store them."""
     drive = limits.drive
     if state.clock[BESIDE] or stamp - state.clock[NEWEST] < SHORTEST_STEP or state.newest[drive] == NONE:
         return False
@@ -245,7 +245,7 @@ def are_strokes_regular(estimates, limits, state, stamp, values):
 
 @inner
 def near(value, estimate, turns):
-    """Return a reading; if it may be whole `turns` off, the one next to its estimate."""
+    """Return a reading; if it is known up to whole `turns`, the value next to its estimate."""
     return value - TURN * np.rint((value - estimate) / TURN) if turns else value
 
 

@@ -17,7 +17,7 @@ from .adjustments import WHOLE
 from .blocks import CODES, REGULAR, STREAMS, ReportBlock, SampleBlock, block_of, joined
 from .sample_check import check_units, merged, samples_of
 from .sample_taker import SampleTaker
-from .update import DONE, FAILED, ODD
+from .update import DONE, FAILED, IRREGULAR
 
 Item = TypeVar("Item", Sample, SampleBlock)
 Result = TypeVar("Result")
@@ -54,6 +54,9 @@ class Twin(SampleTaker):
         Streams with an unknown lag or lead of their stamps. It is estimated, see `clocks`.
     is_follower : bool
         True for a fault twin: its samples are already checked, and their reports are empty.
+    declared : mapping of str to Channel, optional
+        Units, signs, zeros and scales by which a mapping turned readings to samples. Alarms of the wiring name those that the
+        mapping should have, as `boom_twin mapping --check` does. By default, readings are samples.
 
     Attributes
     ----------
@@ -205,10 +208,10 @@ class Twin(SampleTaker):
         """
         if isinstance(sample, Mapping):
             return merged([self.update(each, judged) for each in self.samples(sample, stamp_ns)])
-        sample, self._judged = self._edge.checked(sample), judged
+        sample, self._judged = self._sample_check.checked(sample), judged
         if self._fault_twins is not None:
             self._fault_twins.reach(sample.stamp, self._failing)
-        reason = ODD
+        reason = IRREGULAR
         if self._run is not None and not (self.requests.due and sample.stream is self._drive):
             reason = self._advance_one(sample)
         if reason != DONE:
@@ -245,7 +248,7 @@ class Twin(SampleTaker):
 
     def _take_irregular(self, sample: Sample, reason: int) -> ReportBlock:
         """Take a sample that the compiled update did not take; tell the fault twins."""
-        rows = self._fail(sample, []) if reason == FAILED else self._look_at(sample)
+        rows = self._fail(sample, []) if reason == FAILED else self._decide(sample)
         if self._fault_twins is not None:
             if (change := rows.notes.get(0, REGULAR).change) is not None:
                 self._fault_twins.change(change)
@@ -284,7 +287,7 @@ class Twin(SampleTaker):
                 self._fault_twins.reach(stamp, self._failing)
                 is_later = block.stamps[row:end] // SECOND != stamp // SECOND
                 end = row + int(is_later.argmax()) if is_later.any() else end
-            part, reason, done = block.part(slice(row, end)), ODD, 0
+            part, reason, done = block.part(slice(row, end)), IRREGULAR, 0
             if self._run is not None and not (self.requests.due and is_drive):
                 reason, done = self._compiled.advance(self._run, part)
             if done:
@@ -306,7 +309,7 @@ class Twin(SampleTaker):
 def drive(
     twin: Twin, update: Callable[[Item], Result], items: Iterable[Item | Change | None]
 ) -> Iterator[tuple[Item, Result] | None]:
-    """Yield each item with what `update` gives of it; request each change from the twin at its place.
+    """Yield each item with the result of `update`; request each change from the twin at its place.
 
     `update` is `twin.update` or `twin.take`. A change takes effect with the next full stroke sample, as in the recording.
     None, a message without a usable value, gives None.

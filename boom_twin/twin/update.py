@@ -1,8 +1,7 @@
-"""Compiled update of the twin: regular samples of all streams, many in one call.
+"""Compiled update of the twin by regular samples of all streams, one or many in a call.
 
-What a sample of strokes, angles or accelerations does to the twin while nothing is out of the ordinary is written here, once,
-for the live node (a sample a call) and the replay (many). A sample that is not ordinary ends the call, and
-`boom_twin.twin.twin.Twin` looks at it.
+The live node passes one sample a call, a replay many. An irregular sample ends the call, and `boom_twin.twin.sample_taker`
+takes it.
 """
 
 from __future__ import annotations
@@ -42,33 +41,33 @@ from .state import (
 
 SPAN = 2_000_000_000  # ns for which expected readings are kept
 
-DONE, ODD, LOOK, FAILED = range(4)
-"""Reason why `update` returned: all samples taken; the sample is irregular; the sample is complete and begins a slot, or is
-outside the model's validity; the model failed (see `STATUS`)."""
+DONE, IRREGULAR, LOOK, FAILED = range(4)
+"""Reasons why `update` returns. LOOK: the sample was taken, and begins a slot or is outside the model's validity. FAILED: the
+model failed, see `STATUS`."""
 
 
 @kernel
 def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stamps, values, first, trusted, found):
-    """Take the samples of a block from row `first` on, as long as they are regular; return the reason for the end, and its row.
+    """Take the samples of a block from row `first` on until one is irregular; return the reason for the end, and its row.
 
-    `t` to `out` are the fields of `boom_twin.deviation.predictor.CompiledBoom`, as they are: tuples of tuples take long to
-    compile. `streams`, `stamps`, `values` are those of a `boom_twin.twin.blocks.SampleBlock`. A `trusted` row, the only one,
-    was looked at before; of strokes, ``state.strokes`` and ``state.taken`` hold them. What it gives is added to `found`, an
-    `UpdateOutput`.
+    `t` to `out` are the fields of `boom_twin.deviation.predictor.CompiledBoom`, one by one: tuples of tuples take long to
+    compile. `streams`, `stamps`, `values` are those of a `boom_twin.twin.blocks.SampleBlock`. If `trusted`, the block has one
+    row, which `SampleTaker` has checked; its strokes are in ``state.strokes`` and ``state.taken``. Results are appended to
+    `found`, an `UpdateOutput`.
     """
     row, reason = first, DONE
     while row < stamps.shape[0]:
         stamp, before = stamps[row], found.counts[1]
         if streams[row] != limits.drive:
             if not compare(limits, state, f.lags, streams[row], stamp, values[row], row, trusted, found):
-                reason = ODD
+                reason = IRREGULAR
                 break
             take_residuals(limits, state, p, f, before, found)
             row += 1
             continue
         if not trusted:
             if not are_strokes_regular(f.strokes, limits, state, stamp, values[row]):
-                reason = ODD
+                reason = IRREGULAR
                 break
             note_stamp(state, limits.drive, stamp)
         state.clock[BEGINS_SLOT] = stamp // SLOT != state.clock[IN_SLOT]
@@ -110,7 +109,7 @@ def take_residuals(limits, state, p, f, first, found):
 
 @inner
 def end_step(state, stamp):
-    """Note that the boom was stepped."""
+    """Update the running mean of the interval, the slot and the newest stamp after a step to `stamp` (ns)."""
     span = (stamp - state.clock[NEWEST]) * NANO
     if state.interval[0] != 0.0:
         state.interval[0] += SMOOTHING * (span - state.interval[0])
@@ -121,7 +120,7 @@ def end_step(state, stamp):
 
 @inner
 def give_prediction(pins, live, bending, out, limits, state, stamp, row, found):
-    """Write the row of the newest prediction with its bending moments, and note if the boom is deflected too far."""
+    """Append the newest prediction with its bending moments; set `IS_DEFLECTED` if the deflection exceeds ``limits.valid``."""
     n, k = state.strokes.shape[0], found.counts[0]
     results, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
     found.at[k], found.stamps[k] = row, stamp
@@ -141,7 +140,7 @@ def give_prediction(pins, live, bending, out, limits, state, stamp, row, found):
 
 @inner
 def give_innovations(f, limits, state, stamp, row, found):
-    """Write the residuals of what drives the model against the prediction made before it was taken."""
+    """Append the innovations of the sample that drives the model."""
     k = new_residual(found, row, limits.drive, stamp)
     for i in range(state.taken.shape[0]):
         found.values[k, i], found.sigmas[k, i] = f.innovations[i, 0], math.sqrt(f.innovations[i, 1])
@@ -150,7 +149,7 @@ def give_innovations(f, limits, state, stamp, row, found):
 
 @inner
 def new_residual(found, row, stream, stamp):
-    """Return the place of one more residual, empty, of the sample at `stamp` (ns) that became known by sample `row`."""
+    """Append an empty residual of the sample at `stamp` (ns), computed with sample `row` of the block; return its place."""
     k = found.counts[1]
     found.residual_at[k], found.residual_streams[k], found.residual_stamps[k] = row, stream, stamp
     for i in range(found.values.shape[1]):
@@ -161,7 +160,7 @@ def new_residual(found, row, stream, stamp):
 
 @inner
 def keep_strokes(state, stamp):
-    """Store the newest strokes with those of the last `SPAN`; return their row, where the expected readings go."""
+    """Append the newest strokes to those of the last `SPAN`; return their row in ``state.past``."""
     past = state.past
     while past.bounds[COUNT] > 0 and past.stamps[past.bounds[FIRST]] < stamp - SPAN:
         past.bounds[FIRST] = (past.bounds[FIRST] + 1) % past.stamps.shape[0]
@@ -178,11 +177,9 @@ def keep_strokes(state, stamp):
 
 @inner
 def compare(limits, state, lags, stream, stamp, values, row, trusted, found):
-    """Write the residuals of a measured sample, or store it until its strokes come.
+    """Append the residuals of a measured sample, or store it until its strokes come; return False if it is irregular.
 
-    Its stamp is corrected by the estimated lag of its stream.
-
-    Return False, with nothing done, if the sample is irregular.
+    Its stamp is corrected by the estimated lag of its stream. An irregular sample changes nothing.
     """
     if not trusted and not is_regular(limits, state, stream, stamp, values):
         return False
@@ -201,7 +198,7 @@ def compare(limits, state, lags, stream, stamp, values, row, trusted, found):
 
 @inner
 def wait(limits, state, stream, stamp, values):
-    """Keep a measured sample until its stroke has come: behind those that are earlier, or as early and of an earlier stream."""
+    """Insert a measured sample into the waiting samples, sorted by stamp, then by stream."""
     ring = state.waiting
     at = ring.bounds[COUNT]
     while at > 0 and (ring.stamps[at - 1] > stamp or (ring.stamps[at - 1] == stamp and ring.streams[at - 1] > stream)):
@@ -215,7 +212,7 @@ def wait(limits, state, stream, stamp, values):
 
 @inner
 def move_row(ring, old, new):
-    """Copy a row of samples that wait."""
+    """Copy a row of the waiting samples."""
     ring.stamps[new], ring.streams[new] = ring.stamps[old], ring.streams[old]
     for i in range(ring.values.shape[1]):
         ring.values[new, i] = ring.values[old, i]
@@ -223,7 +220,7 @@ def move_row(ring, old, new):
 
 @inner
 def flush_waiting(limits, state, row, found):
-    """Write the residuals of all samples that waited for the newest stroke."""
+    """Append the residuals of all waiting samples up to the newest stroke, and remove these samples."""
     ring, done = state.waiting, 0
     while done < ring.bounds[COUNT] and ring.stamps[done] <= state.clock[NEWEST]:
         if not write_residual(limits, state, ring.streams[done], ring.stamps[done], ring.values[done], row, found):
@@ -235,7 +232,7 @@ def flush_waiting(limits, state, row, found):
 
 @inner
 def forget_waiting(ring, count):
-    """Drop the first `count` of the samples that wait."""
+    """Remove the first `count` waiting samples."""
     for k in range(count, ring.bounds[COUNT]):
         move_row(ring, k, k - count)
     ring.bounds[COUNT] -= count
@@ -243,7 +240,7 @@ def forget_waiting(ring, count):
 
 @kernel
 def write_residual(limits, state, stream, stamp, values, row, found):
-    """Write the residuals of one sample from the readings expected at its stamp; return False if there are none."""
+    """Append the residuals of one sample to the readings expected at its stamp; return False if these are not in memory."""
     after, share = matched(state.past, stamp)
     if after < 0:
         return False
@@ -268,9 +265,9 @@ def write_residual(limits, state, stream, stamp, values, row, found):
 
 @kernel
 def matched(past, stamp):
-    """Return the first row of expected readings not before `stamp`, and the place of `stamp` between it and the row before.
+    """Return the first row of expected readings not before `stamp`, and its weight in the interpolation with the row before.
 
-    The place is a share: 1 at the row itself, 0 at the row before. The row is -1 if no rows surround `stamp`.
+    The weight is 1 at the stamp of the row, 0 at that of the row before. The row is -1 if no rows surround `stamp`.
     """
     at = -1
     for back in range(past.bounds[COUNT]):

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..types import SENSORS, Stream, channels_of
+from ..types import SENSORS, Channel, Stream, channels_of
 from .hypotheses import (
     ANY_ZERO,
     MOST,
@@ -36,7 +36,7 @@ from .hypotheses import (
     stroke_cube,
     without,
 )
-from .readings import Channel, Expected, RestModel, Table, Window, tables_of
+from .readings import Expected, RestModel, Table, Window, tables_of
 
 SURE = 7.0  # nats to the next hypothesis, least margin that determines a channel
 WRONG = 4.0  # nats per block (2.8 standard deviations) above which a channel is not as declared

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
-from ..types import GIVE, SENSORS, Array, Mount, Stream
-from .readings import Channel, Expected, Table
+from ..types import GIVE, SENSORS, Array, Channel, Mount, Stream
+from .readings import Expected, Table
 
 ANGLE_ERROR = math.radians(0.7)  # rad, zero error of an encoder and error of the scene
 MOST = 12.0  # nats, largest cost of a block, as a reading may err for a reason without hypothesis
@@ -106,6 +106,11 @@ def si(channel: Channel, units: Mapping[str, float], readings: Array) -> Array:
     return channel.sign * channel.scale * units[channel.unit] * (readings - channel.zero)
 
 
+def as_read(channel: Channel, units: Mapping[str, float], quantities: Array) -> Array:
+    """Return the readings of quantities (SI), the inverse of `si`."""
+    return quantities / (channel.sign * channel.scale * units[channel.unit]) + channel.zero
+
+
 def ways(base: Channel, units: Mapping[str, float]) -> list[Channel]:
     """Return a sensor with every unit and sign."""
     return [base._replace(unit=unit, sign=sign) for unit in units for sign in (1, -1)]
@@ -153,7 +158,7 @@ def _angle_errors(readings: Array, own: Channel, expected: Expected, j: int) -> 
 
 
 def other_boom(table: Table, declared: Sequence[Channel], expected: Expected) -> tuple[float, Array]:
-    """Return the cost of angles as declared at a boom with other linkages, and by what they turn its sections (blocks, n)."""
+    """Return the cost of declared angles at a boom with other linkages, and the rotations of its sections, rad (blocks, n)."""
     cost, turns, turn, units = OTHER_BOOM, list[Array](), np.zeros(len(table.values)), SENSORS[Stream.ANGLES].units
     for j, own in enumerate(declared):
         off = _angle_errors(si(own, units, table.values[:, table.names.index(own.name)]), own, expected, j)

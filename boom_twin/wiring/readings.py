@@ -25,18 +25,6 @@ from ..types import NANO, NO_PLACES, SENSORS, Array, Mount, Place, Stream, Strok
 BLOCK = 100_000_000  # ns, averaging time of readings
 
 
-class Channel(NamedTuple):
-    """Way to read a channel: quantity = sign * scale * (reading - zero), in `unit`. `turned` is an IMU's rotation, rad."""
-
-    name: str
-    unit: str
-    sign: int = 1
-    zero: float = 0.0
-    scale: float = 1.0
-    absolute: Mount | None = None
-    turned: float = 0.0
-
-
 def is_checked(stream: Stream) -> bool:
     """Return True if a commissioning check covers the stream."""
     return stream in (Stream.STROKES, Stream.ANGLES, Stream.FORCES) or SENSORS[stream].is_accelerometer

@@ -87,6 +87,20 @@ def test_refused(capsys: Capture, given: list[str], told: str) -> None:
     assert told in line and first.startswith("scene: default scene")
 
 
+def test_a_rigid_boom_stays_where_it_is(capsys: Capture, tmp_path: Path) -> None:
+    spec = booms.document()
+    for joint in spec["joints"]:
+        joint["cylinder"] = {key: value for key, value in joint["cylinder"].items() if key not in ("k", "d")}
+    (tmp_path / "rigid.yaml").write_text(json.dumps(spec | {"modes": 0}))
+    given = "response", str(tmp_path / "rigid.yaml"), "--posture", "arch"
+    found = answer(capsys, *given)
+    assert max(found["tip_y_m_amplitude"]) == max(found["joint_1_rad_amplitude"]) == 0.0
+    assert max(found["cylinder_force_1_N_amplitude"]) > 1.0
+    assert answer(capsys, *given, "--pump", "0.4:130")["tip_swing_m"] == 0.0
+    assert main([*given]) == 0
+    assert "nothing in this model can vibrate" in capsys.readouterr().out
+
+
 def test_without_damping_no_amplitude_is_made_up_at_a_resonance(capsys: Capture, tmp_path: Path) -> None:
     spec = booms.document()
     for joint in spec["joints"]:

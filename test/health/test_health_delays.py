@@ -122,7 +122,7 @@ def test_a_boom_at_rest_has_no_lag() -> None:
 
 def test_a_lag_that_fault_twins_name_too_is_one_alarm() -> None:
     streams = channels_of(4)
-    monitor = HealthMonitor(load_scene(), Settings(), (None,) * 4, (), streams, StrokeReading.LENGTH, NO_PLACES)
+    monitor = HealthMonitor(load_scene(), Settings(), (None,) * 4, (), streams, StrokeReading.LENGTH, NO_PLACES, {})
     judged(monitor._lags, 0.03, 40.0)
     (alarm,) = monitor._lags.alarms
     monitor.fault_twins = SimpleNamespace(alarms=[replace(alarm, since=0)])  # type: ignore[assignment]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.types import Place
+from boom_twin.types import Channel, Place
 
 from .recorded import Outcome, run, session
 
@@ -44,6 +44,15 @@ def test_it_is_reported_and_not_used(case: str) -> None:
     assert any(told in alarm.evidence and "mapping --check" in alarm.told for _, alarm in found.states())
     most = 0.25 if stream is Stream.STROKES else 6e-3  # angle sensors take the place of strokes; without them it is 2 m
     np.testing.assert_allclose(tips(found)[800:], tips(right)[800:], atol=most)
+
+
+def test_a_wrong_unit_of_the_mapping_is_named_as_by_the_check_of_a_session() -> None:
+    """The mapping says deg, and the encoders read rad."""
+    names = [f"joint_{i}" for i in range(1, 5)]
+    twin = Twin(load_scene(), health=True, declared={name: Channel(name, "deg") for name in names})
+    found = run(rewired(Stream.ANGLES, np.radians, 8.0), twin=twin)
+    told = {alarm.evidence.removeprefix("perhaps ") for time, alarm in found.states() if time > 4.0}
+    assert told == {f"{name}, rad" for name in names}
 
 
 def test_what_is_not_determined_is_not_almost_certain() -> None:

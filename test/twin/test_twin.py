@@ -109,28 +109,6 @@ def test_waits_for_all_strokes(twin, still):
     assert twin.update(strokes(10, still)).accepted
 
 
-def test_a_gap_is_bridged_and_flagged(scene, still):
-    steady, gappy = drive_twin(scene), drive_twin(scene)
-    for ms in range(0, 3000, 5):
-        a = steady.update(strokes(ms, moved(still, ms * 1e-3))).prediction
-        if not 100 < ms < 400:
-            report = gappy.update(strokes(ms, moved(still, ms * 1e-3)))
-            if ms == 400:
-                assert report.events == ("leap",) and report.prediction is None
-            if ms == 405:
-                assert report.events == ("gap",) and report.prediction.stamp == START + 405 * MS
-    assert gappy.counts == {"leap": 1, "gap": 1}
-    assert report.prediction.tip_position == pytest.approx(a.tip_position, abs=0.02)
-
-
-def test_a_long_pause_starts_again_from_rest(twin, still):
-    follow(twin, still, 300)
-    reports = [twin.update(strokes(300 + 60_000 + ms, still)) for ms in range(0, 105, 5)]
-    assert all(report.events == ("leap",) and report.prediction is None for report in reports[:-1])
-    report = reports[-1]
-    assert report.events == ("restart",) and report.change.from_rest and is_at_rest(report.prediction)
-
-
 def test_time_set_back_starts_everything_again(scene, new, still):
     fresh, looped = new(scene), new(scene)
     follow(looped, still, 2000)

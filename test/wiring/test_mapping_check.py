@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 import yaml
-from command import main
-from recordings import write_session
+from command import answer, main
+from recordings import MessageWriter, load_mapping, samples_in_rows, sensor_message, write_session
 from session_readings import rows_in
 
 from boom_twin import Stream
@@ -115,6 +115,18 @@ def test_the_mapping_that_is_proposed_mends_the_session(
     assert again["mapping"] is None and not any(again["wrong"])
 
 
+def test_a_session_of_a_node_in_a_namespace(rows: Rows, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    values = {Stream.STROKES: rows.strokes, Stream.ANGLES: scaled(rows.joints, 1, 1, -1, 1), Stream.IMU: rows.imu}
+    topics = load_mapping().in_namespace("front").inputs
+    with MessageWriter(tmp_path / "bag", {stream: topics[stream] for stream in values}) as bag:
+        for sample in samples_in_rows(rows.stamps, values):
+            bag.write(sample.stream, sample.stamp, sensor_message(sample))
+    given = "--namespace", "front"
+    assert "joint_3: {sign: -1}" in checked(capsys, tmp_path / "bag", *given)["mapping"]
+    told = answer(capsys, "info", str(tmp_path / "bag"), *given)
+    assert not told["missing_for_replay"] and "joint_3" in told["wiring"]
+
+
 def test_a_late_stream_and_its_delay(rows: Rows, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     late = rows.stamps + 60_000_000
     bag, out = written(rows, tmp_path / "bag", angle_stamps_ns=late), tmp_path / "mapping.yaml"
@@ -176,8 +188,9 @@ def test_a_session_of_another_boom_is_refused(rows: Rows, tmp_path: Path, capsys
     fewer = rows._replace(strokes=rows.strokes[:, :2], joints=rows.joints[:, :2])
     assert main(["mapping", "--check", str(written(fewer, tmp_path / "bag"))]) == 1
     assert "no time in which all 4 cylinders" in capsys.readouterr().err
-    assert main(["mapping", "--out", "x.yaml"]) == 1
-    assert "Add --check BAG" in capsys.readouterr().err
+    for option, value in (("--out", "x.yaml"), ("--namespace", "front")):
+        assert main(["mapping", option, value]) == 1
+        assert f"{option} {value}: only with --check BAG" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("has_imu", [True, False])

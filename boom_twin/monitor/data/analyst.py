@@ -33,7 +33,7 @@ SIGNALS = (
     Signal("estimated from all sensors", ESTIMATE, (4, 5), ("forward", "up")),
     PREDICTION,
 )
-"""The best first: the prediction knows nothing of what shakes the boom."""
+"""The best first: the prediction contains no vibration by disturbance forces."""
 
 SPECTRUM_SPAN = 40.0  # time span of the spectrum, up to the shown time, s
 

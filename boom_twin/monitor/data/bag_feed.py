@@ -1,4 +1,4 @@
-"""Feed from a recorded session: what its node published, or what a twin says to it now."""
+"""Feed from a recorded session: the outputs that its node published, or those of a twin that runs now."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _take_predicted(feed: BagFeed, topics: Topics, given: ReplayInputs, twin: Tw
 
 
 class TwinView:
-    """View of a twin without a node, which is diagnosed as a live node diagnoses its own. Its time is that of the stamps."""
+    """View of a twin without a node: encodes its outputs and diagnoses it, as a node does. Its clock is the stamps."""
 
     def __init__(self, feed: Feed, topics: Topics, twin: Twin) -> None:
         self._feed, self._time, self.twin = feed, 0.0, twin

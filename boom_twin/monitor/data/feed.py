@@ -26,8 +26,8 @@ class Feed:
     def __init__(self, title: str, store: Store, topics: Topics, scene: Scene | None = None, end: float | None = None) -> None:
         self.title, self.store, self.end = title, store, end
         self.topic_rows = TopicRows(store, topics)
-        self.trouble = ""  # why there is not more to be had
-        self.phase = ""  # what is done before data can be shown, in words
+        self.trouble = ""  # fault that ended the reading
+        self.phase = ""  # preparation that precedes the first data, in words; empty without one
         self._scene, self._reads = scene, topics.stroke_reading
         self._plan: Plan | None = None
 
@@ -75,7 +75,7 @@ class Feed:
 
 
 class Playback:
-    """Position (s) in a recorded session. Unless held, it advances at a speed up to what has been read of the session."""
+    """Position (s) in a recorded session. Unless held, it advances at a speed, at most to the end of the part that was read."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
@@ -104,5 +104,5 @@ class Playback:
         self.is_held = bool(is_held)
 
     def seek(self, position: float) -> None:
-        """Move to `position` (s), limited to what has been read."""
+        """Move to `position` (s), limited to the part that was read."""
         self.position = min(max(position, 0.0), self._feed.store.newest, self._feed.end or 0.0)

@@ -15,7 +15,7 @@ from ...texts import LANGUAGES, alarm_sentence, alarm_text
 from ...types import Alarm
 
 SILENCE = 3.0  # seconds without a word from a node after which its lamps are stale
-MAX_NODES, FORGET_AFTER = 200, 60.0  # number of nodes above which those that have been silent for so many seconds are deleted
+MAX_NODES, FORGET_AFTER = 200, 60.0  # above this number of nodes, those silent for longer (s) are deleted
 GROUPS = ("sensors", "model", "residuals", "timing", "recorder")
 HEALTH = "health"  # the status that stands for all alarms of the rig's health
 SENSOR_GROUPS = ("sensor", "residual")  # kinds of statuses that speak of one channel, as an alarm of the rig's health does
@@ -225,7 +225,7 @@ class AlarmList:
         self._judged = lasting
 
     def _fold(self, channel: str) -> None:
-        """Take the alarms of lamps about a channel out, because health tells of it: one fault is one alarm."""
+        """Remove the alarms of lamps of a channel that has a health alarm: one fault is one alarm."""
         names = [f"{kind} {channel}" for kind in SENSOR_GROUPS]
         for key in [key for key, alarm in self._open.items() if alarm.name in names]:
             gone = self._open.pop(key)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...messages.sample_decoder import LATEST, MOST_NAMES, stamp_of
+from ...messages.sample_decoder import LATEST, MOST_NAMES
 from ...system.terminal_text import printable
 from ...types import NANO, SECOND, SENSORS, Stream, stream_of
 from .status import AlarmList, StatusTable
@@ -202,12 +202,7 @@ class DroppedMessages:
             LOG.warning("dropped message %d of %s: %s", count, topic, self.by_topic[topic]["reason"])
 
 
-def check_stamp(msg: Any) -> int:
-    """Return ``header.stamp`` in ns; raise MalformedError unless it is after 1970 and fits into a message."""
-    return check_instant(stamp_of(msg))
-
-
-def check_instant(found: int) -> int:
+def check_stamp(found: int) -> int:
     """Return the stamp `found` (ns); raise MalformedError unless it is after 1970 and fits into a message."""
     if not 0 < found < LATEST:
         raise MalformedError("no stamp" if found == 0 else f"impossible stamp {found / 1e9:.9g} s")

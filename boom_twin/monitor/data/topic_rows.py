@@ -24,7 +24,6 @@ from .store import (
     Store,
     check_arrays,
     check_count,
-    check_instant,
     check_numbers,
     check_residuals,
     check_stamp,
@@ -33,7 +32,7 @@ from .store import (
 MAX_STATUSES, MAX_CAUSES, MAX_MARKERS = 500, 100, 500
 """Statuses or alarms of one message, causes of one alarm, markers of one shape."""
 MAX_WAITING = 1000  # stamps of which parts may wait for the others
-COMPARED = Stream.IMU  # the stream whose readings are shown beside the predicted ones; of all others the residuals are
+COMPARED = Stream.IMU  # stream whose readings are shown beside the predicted ones; the others are shown as residuals
 RESIDUALS = {stream: "joints" if stream is Stream.ANGLES else stream.value for stream in Stream if stream is not COMPARED}
 """Names of the tables of residuals."""
 NO_MEASUREMENT = "no measurement"  # oddity of `SampleDecoder` that is no fault here: an Imu states that it has no measurement
@@ -66,7 +65,7 @@ VECTORS = {
 JOINED = (
     Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD,
 )  # fmt: skip
-"""Outputs of which a row of estimates is made, those of one stamp together."""
+"""Outputs with equal stamps that make one row of estimates."""
 FORCE_COLUMNS = tuple(f"{kind}_{axis}_m_s2" for kind in ("measured", "predicted", "sigma") for axis in "xz")
 
 
@@ -144,7 +143,7 @@ class TopicRows:
             self._takers[topic](decode(data, self._types[topic]))
 
     def measure(self, sample: Sample) -> None:
-        """Put the measured specific force beside its residual, whichever comes first; other samples are passed over."""
+        """Join a measured specific force with its residual, in any order of arrival; ignore samples of other streams."""
         if sample.stream is COMPARED:
             self._join_force(COMPARED, sample.stamp, sample.values.tolist())
 
@@ -165,7 +164,7 @@ class TopicRows:
             raise MalformedError(", ".join(odd))
 
     def _take_vector(self, role: Output, msg: Any) -> None:
-        vector, stamp = VECTORS[role], check_stamp(msg)
+        vector, stamp = VECTORS[role], check_stamp(stamp_of(msg))
         point = vector.get(msg)
         values = check_numbers((point.x, point.z))
         if vector.covariance is not None:
@@ -184,7 +183,7 @@ class TopicRows:
             self._append(ESTIMATE, ESTIMATE_COLUMNS, stamp, [*shown, *pose[2:], *acceleration, *load])
 
     def _take_event(self, msg: Any) -> None:
-        time = self._store.time(check_stamp(SimpleNamespace(header=msg)))
+        time = self._store.time(check_stamp(stamp_of(SimpleNamespace(header=msg))))
         self._store.alarms.add("event", Severity.OK, text(msg.msg), time, time)
 
     def _take_cylinders(self, msg: Any) -> None:
@@ -195,7 +194,7 @@ class TopicRows:
 
     def _take_residuals(self, msg: Any) -> None:
         check_arrays(msg, "position", "velocity", "effort")
-        stamp, stream = check_stamp(msg), check_residuals(msg.name)
+        stamp, stream = check_stamp(stamp_of(msg)), check_residuals(msg.name)
         values, ratios, sigmas = (check_numbers(each, may_lack=True) for each in (msg.position, msg.velocity, msg.effort))
         if stream is COMPARED:
             self._join_force(Output.RESIDUALS, stamp, values + sigmas)
@@ -226,16 +225,16 @@ class TopicRows:
         columns += [f"stroke_{i + 1}_m" for i in range(len(self._strokes))]
         check_count("numbers of a shape", len(columns), max_columns)
         values = check_numbers([number for point in (*boom, *straight, *pins) for number in (point.x, point.z)])
-        self._append("shape", columns, check_stamp(msg.markers[0]), values + self._forces + self._strokes)
+        self._append("shape", columns, check_stamp(stamp_of(msg.markers[0])), values + self._forces + self._strokes)
 
     def _take_health(self, msg: Any) -> None:
         check_count("alarms", len(msg.status), MAX_STATUSES)
         store, found = self._store, decode_health(msg)
         for alarm in found:
             check_count("causes of an alarm", len(alarm.ranked), MAX_CAUSES)
-            check_instant(alarm.since)
-            check_instant(alarm.since if alarm.until is None else alarm.until)
-        store.alarms.judge(store.time(check_stamp(msg)), found, store.time)
+            check_stamp(alarm.since)
+            check_stamp(alarm.since if alarm.until is None else alarm.until)
+        store.alarms.judge(store.time(check_stamp(stamp_of(msg))), found, store.time)
 
     def _take_state(self, msg: Any) -> None:
         check_count("statuses", len(msg.status), MAX_STATUSES)

@@ -1,4 +1,4 @@
-"""Work beside the callbacks of a node: in a thread, and the live page in a process."""
+"""Background work of a node: a thread for long tasks, and the process of the live page."""
 
 from __future__ import annotations
 

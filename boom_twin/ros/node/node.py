@@ -171,12 +171,11 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         topics = load_mapping(path_of(self, "mapping"), joints).of_scene(scene.joints)
         self._topics = self._topics.model_copy(update={"areas": topics.areas})
         health, causes = (self.get_parameter(key).value for key in ("health", "causes"))
-        mounts, frame = topics.mounts(joints), frame_of(self, topics)
+        frame = frame_of(self, topics)
 
         def make() -> Twin:
-            reads, absent = topics.stroke_reading, topics.absent
-            given = scene, topics.noise_of(settings), mounts, health, reads, absent
-            twin = Twin(*given, causes=causes, is_live=True, places=topics.places, lagging=topics.lagging)
+            noise, sensing = topics.noise_of(settings), topics.sensing(joints)
+            twin = Twin(scene, noise, health=health, causes=causes, is_live=True, **sensing)
             twin.warm_up()
             import_module("scipy.special")  # the first alarm and the first pause need it; their samples would wait 0.3 s
             return twin
@@ -213,7 +212,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._twin.renew()
         self._diagnostics.start()
         gc.collect()
-        gc.freeze()  # what lives from here on as long as the node is not searched again
+        gc.freeze()  # objects that live as long as the node are not collected again
         for name, streams in self._topics.streams_by_topic.items():
             topic = self._topics.inputs[streams[0]]
             kind, qos = message_class(topic.type), qos_profile(topic.qos)

@@ -76,7 +76,7 @@ def declare(node: Node) -> None:
 
 
 def _unknown(node: Node, names: Iterable[str]) -> str:
-    """Return an error text on those of `names` that are no parameters; empty if all are."""
+    """Return an error text on the `names` that are no parameters; empty if all are."""
     # rclpy declares QoS overrides with their topics
     unknown = sorted(name for name in names if not (node.has_parameter(name) or name.startswith("qos_overrides.")))
     known = [row.name for row in TABLE]

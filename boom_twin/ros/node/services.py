@@ -118,7 +118,7 @@ class StartLog:
             words.insert(0, f"could not start: {report.status}")
         elif change.from_rest:
             words.insert(0, f"started from rest ({', '.join(report.events) or 'first strokes'})")
-        if not words:  # what was asked for was so before
+        if not words:  # the requested values were set before
             return
         self._told = time.monotonic()
         self._log.info(f"at {change.stamp // 10**9}.{change.stamp % 10**9:09d}: {'; '.join(words)}")

@@ -25,11 +25,11 @@ from recordings import read, scan, scene_of
 
 from boom_twin import Scene, load_scene, simulate
 from boom_twin.sensor_kinds import G
-from boom_twin.types import SENSORS, Stream, StrokeReading
+from boom_twin.types import SENSORS, Channel, Stream, StrokeReading
 from boom_twin.validation.rig.faults import wrong_by
 from boom_twin.validation.rig.motion import random_programme
 from boom_twin.wiring.check import Verdict, check
-from boom_twin.wiring.readings import Channel, RestModel, Series
+from boom_twin.wiring.readings import RestModel, Series
 
 ROOT = Path(__file__).parents[3]
 BUNDLED = "arch_session", "pump_session"
