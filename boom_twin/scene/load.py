@@ -158,10 +158,8 @@ Check = Callable[[Draft], Findings]
 CONSISTENCY: tuple[Check, ...] = (values.counts, values.base, values.sections, values.joints)
 """Keys that need or exclude each other. A scene with such a fault has no geometry to check."""
 CHECKS: tuple[Check, ...] = (
-    values.modes,
     values.worn_pins,
     geometry.placed_pins,
-    geometry.thin_parts,
     geometry.joints,
     sizes.suspects,
 )

@@ -23,7 +23,11 @@ MISTAKES = [
     ("lL: 0.42", "lL: 0.15", "line 38: joints[1].range_deg = [-150.0, 0.0]: the links lL and lR, between D and E, do not"),
     ("D: [-0.14, -0.04]", "D: [-0.30, -0.04]", "line 40: joints[1].D = [-0.3, -0.04]: D must lie on the rigid head"),
     ("I: 2.02e-5", "I: 2020", "line 13: sections[0].I = 2020.0: more than 0.1 m^4: cm^4 or mm^4?"),
-    ("range_deg: [-150, 0]", "range_deg: [-2.6, 0]", "line 38: joints[1].range_deg = [-2.6, 0.0]: all within 6.3: radians?"),
+    (
+        "range_deg: [-150, 0]",
+        "range_deg: [-2.6, 0]",
+        "line 38: joints[1].range_deg = [-2.6, 0.0]: both are within 6.28",
+    ),
     ("kind: B1", "kind: B2", "line 37: joints[1].R is absent: a joint of kind B2 needs it."),
     ("beta: 1.0e-3", "betta: 1.0e-3", "line 15: sections[0].betta = 0.001: unknown key in sections[0]. The nearest known"),
     ("lL: 0.42", "lL: 0,42", "line 42: joints[1].lL = '0,42': a number is needed, not text. Write a decimal point: 0.42."),
