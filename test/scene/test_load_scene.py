@@ -95,7 +95,7 @@ def test_what_the_format_allows_loads_without_a_warning(bench: Any) -> None:
     assert scene.tip is None and scene.sections[2].head is None and scene.sections[2].beta is None
     assert scene.joints[2].cylinder.barrel is None, "an empty key is an absent key"
     scene = load_scene(bench.edited(_all_options))
-    assert [scene.modes_of(i) for i in range(4)] == [2, 0, 2, 2]
+    assert [scene.of_section(i, "modes") for i in range(4)] == [2, 0, 2, 2]
     assert [scene.is_flexible(i) for i in range(4)] == [True, False, True, True]
 
 
