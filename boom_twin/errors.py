@@ -78,6 +78,11 @@ def _shortened(value: Any, width: int = 60) -> str:
     return text if len(text) <= width else f"{text[: width - 12]} ... {text[-7:]}"
 
 
+def bound_of(message: str) -> str:
+    """Return a message of pydantic as the bound of a `Fault`: ``it must be greater than 0``."""
+    return (message[:1].lower() + message[1:]).replace("input should", "it must")
+
+
 def listed(source: str, faults: Sequence[Fault]) -> str:
     """Return the text of an error that lists the faults of a file."""
     count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"

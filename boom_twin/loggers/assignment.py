@@ -11,7 +11,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ..config.yaml_text import read_plain
-from ..errors import BagError, Fault, UsageError, listed
+from ..errors import BagError, Fault, UsageError, bound_of, listed
 from ..types import SENSORS, Stream, channels_of, sensor_kind, stream_of
 from .csv_layout import TIME_UNITS, guess, unit_of
 from .log_table import LogTable
@@ -53,7 +53,7 @@ def columns_from(document: Any, source: str) -> ColumnFile:
         found = ColumnFile.model_validate(document or {})
     except ValidationError as error:
         faults = [
-            Fault(".".join(map(str, each["loc"])), each["input"], each["msg"][:1].lower() + each["msg"][1:], _SEE)
+            Fault(".".join(map(str, each["loc"])), each["input"], bound_of(each["msg"]), _SEE)
             for each in error.errors(include_url=False)
         ]
     else:

@@ -42,7 +42,7 @@ def test_check_of_a_bad_scene_exits_with_1_and_says_why(tmp_path: Path, capsys: 
     out, err = capsys.readouterr()
     assert out == ""
     assert err.startswith(f"boom_twin check: {path}: 1 fault\n")
-    assert "sections[0].root.mass = -36.0: it must not be less than 0. Give the mass in kg." in err
+    assert "sections[0].root.mass = -36.0: it must be greater than or equal to 0. Give the mass in kg." in err
     assert main(["check", str(tmp_path / "nowhere.yaml")]) == 1
     assert "No such file" in capsys.readouterr().err
 
