@@ -65,17 +65,19 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
     """Yield a warning of each part by whose damping alone the first mode has a damping ratio outside `DAMPING`."""
     if not len(found.frequencies):
         return
-    parts: list[tuple[Place, float, float]] = []  # place, value, and 1 s over the stiffness that the damping goes with
+    parts: list[tuple[Place, float, float]] = []  # place, value, and the stiffness that it is a multiple of; beta has 1
     for i, (section, joint) in enumerate(zip(scene.sections, scene.joints, strict=True)):
         parts.append((("sections", i, "beta"), section.beta or 0.0, 1.0))
-        parts.append((("joints", i, "cylinder", "d"), joint.cylinder.d or 0.0, 1.0 / joint.cylinder.middle_stiffness))
-    parts.append((("base", "damping"), scene.base.damping or 0.0, 1.0 / (scene.base.stiffness or math.inf)))
+        parts.append((("joints", i, "cylinder", "d"), joint.cylinder.d or 0.0, joint.cylinder.middle_stiffness))
+    parts.append((("base", "damping"), scene.base.damping or 0.0, scene.base.stiffness or math.inf))
     frequency = min(float(found.frequencies[0]), FASTEST)
     remedy = "beta is 2 zeta / omega (s), zeta the damping ratio; d, and damping of a base, are that times the stiffness."
-    for place, value, share in parts:
-        if (ratio := math.pi * frequency * value * share) > 0.0:
+    for place, value, stiffness in parts:
+        if value > 0.0 and 0.0 < stiffness < math.inf:
+            ratio = math.pi * frequency * value / stiffness
             says = f"alone it damps a mode of {frequency:.2g} Hz by {100 * ratio:.2g} %; "
-            yield from draft.expect(place, value, DAMPING, value / ratio, "", remedy, says=says)
+            unit = stiffness / (math.pi * frequency)  # of `value`, per damping ratio
+            yield from draft.expect(place, value, DAMPING, unit, "", remedy, says=says)
 
 
 def _pressure(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
