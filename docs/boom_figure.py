@@ -11,8 +11,8 @@ from boom_twin import Scene
 from boom_twin.analysis.equilibrium import Equilibrium
 from boom_twin.analysis.undeflected import UndeflectedBoom
 from boom_twin.compiler.compile import compile_scene
-from boom_twin.plots.boom import draw_base, draw_cylinder, draw_link, draw_pin, draw_section, section_parts
-from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture, side_view
+from boom_twin.plots.boom import draw_cylinder, draw_link, draw_section, section_parts
+from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, draw_base, draw_pin, picture, side_view
 from boom_twin.scene.kinematics import Skeleton, joint_angles_of_strokes, skeleton
 from boom_twin.types import Array
 

@@ -16,15 +16,8 @@ from page_figure import CHROMIUM, page_picture
 
 from boom_twin.analysis.equilibrium import statics
 from boom_twin.cli.main import main as command
-from boom_twin.plots.boom import (
-    draw_base,
-    draw_cylinder,
-    draw_link,
-    draw_pin,
-    draw_section,
-    section_parts,
-)
-from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture
+from boom_twin.plots.boom import draw_cylinder, draw_link, draw_section, section_parts
+from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, draw_base, draw_pin, picture
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.kinematics import JointPins, Skeleton, skeleton, stroke_curve
 from boom_twin.scene.load import examine_text, example_text
