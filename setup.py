@@ -78,7 +78,7 @@ setup(
             "distributed>=2025.5,<2027",
             "pyarrow>=18,<27",
         ],
-        "import": ["npTDMS>=1.13,<2", "asammdf>=8.8,<9", "pyarrow>=18,<27", "tzdata>=2025.1"],
+        "import": ["pyarrow>=18,<27", "tzdata>=2025.1"],
         "fatigue": ["rainflow>=3.2,<4"],
         "notebook": ["pandas>=2.2,<4", "nbclient>=0.10,<1", "nbformat>=5.10,<6", "ipykernel>=6.29,<8"],
         "docs": [

@@ -58,7 +58,7 @@ class Fault:
     bound: str  # what would be allowed
     remedy: str
     line: int | None = None  # line of the file, from 1
-    kind: FaultKind = "fault"  # ``warning`` if the scene can be used; ``note`` if ``check --strict`` lets it pass, too
+    kind: FaultKind = "fault"  # ``warning`` if the scene can be used; ``note`` if it need not even be mended
 
     def __str__(self) -> str:
         where = self.path if self.line is None else f"line {self.line}: {self.path}"
@@ -76,6 +76,11 @@ def _shortened(value: Any, width: int = 60) -> str:
     else:
         text = repr(value)
     return text if len(text) <= width else f"{text[: width - 12]} ... {text[-7:]}"
+
+
+def bound_of(message: str) -> str:
+    """Return a message of pydantic as the bound of a `Fault`: ``it must be greater than 0``."""
+    return (message[:1].lower() + message[1:]).replace("input should", "it must")
 
 
 def listed(source: str, faults: Sequence[Fault]) -> str:

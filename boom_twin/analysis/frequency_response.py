@@ -109,7 +109,7 @@ def with_all_shapes(scene: Scene) -> Scene:
     the default boom's answer is within 1e-6 of that with more (with three 0.14 %).
     """
     sections = [
-        section.model_copy(update={"modes": max(SHAPES, scene.modes_of(i))}) if scene.is_flexible(i) else section
+        section.model_copy(update={"modes": max(SHAPES, scene.of_section(i, "modes"))}) if scene.is_flexible(i) else section
         for i, section in enumerate(scene.sections)
     ]
     return scene.model_copy(update={"sections": sections})

@@ -224,41 +224,23 @@ class Recorded:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class WrittenFile:
-    """Complete file of a bag: name, first and last log time (ns; 0 without messages) and number of messages."""
-
-    name: str
-    first: int
-    last: int
-    count: int
-
-    @property
-    def metadata(self) -> dict[str, Any]:
-        """Entry of the file in ``metadata.yaml``."""
-        return {"path": self.name, **_span(self.first, self.last), "message_count": self.count}
-
-
-def _span(first: int, last: int) -> dict[str, Any]:
-    return {"starting_time": {"nanoseconds_since_epoch": first}, "duration": {"nanoseconds": last - first}}
-
-
 def metadata_of(
-    files: Sequence[WrittenFile], topics: Sequence[Recorded], counts: Mapping[int, int], notes: Mapping[str, str], distro: str
+    file: str, span: tuple[int, int], topics: Sequence[Recorded], counts: Sequence[int], notes: Mapping[str, str], distro: str
 ) -> BagMetadata:
-    """Return the metadata of a whole bag. `counts` are messages by index in `topics`."""
-    filled = [file for file in files if file.count]
-    first, last = min((file.first for file in filled), default=0), max((file.last for file in filled), default=0)
+    """Return the metadata of a bag of one file. `span` is first and last log time (ns), 0 without messages."""
+    first, last = span
+    times: dict[str, Any] = {"starting_time": {"nanoseconds_since_epoch": first}, "duration": {"nanoseconds": last - first}}
+    count = sum(counts)
     return BagMetadata(
         version=9,  # of the format that Jazzy writes
         storage_identifier="mcap",
-        **_span(first, last),
-        message_count=sum(file.count for file in files),
+        **times,
+        message_count=count,
         topics_with_message_count=[
-            TopicCount(topic_metadata=topic.metadata, message_count=counts[key]) for key, topic in enumerate(topics)
+            TopicCount(topic_metadata=topic.metadata, message_count=own) for topic, own in zip(topics, counts, strict=True)
         ],
-        relative_file_paths=[file.name for file in files],
-        files=[file.metadata for file in files],
+        relative_file_paths=[file],
+        files=[{"path": file, **times, "message_count": count}],
         custom_data=dict(notes) or None,
         ros_distro=distro,
     )

@@ -91,9 +91,7 @@ def _recover(path: Path, out: Path) -> Recovery:
     bag = BagWriter(out, {**notes, RECOVERED: path.name}, distro=metadata.ros_distro if metadata else "")
     keys: dict[tuple[str, str, bytes], int] = {}
     try:
-        for number, (file, definitions) in enumerate(zip(files, all_definitions, strict=True)):
-            if number and bag.first is not None:
-                bag.split()
+        for file, definitions in zip(files, all_definitions, strict=True):
             with as_bag_error(file):
                 _copy(file, definitions, bag, keys, outcome, metadata)
         bag.close()

@@ -22,7 +22,7 @@ from ..twin.blocks import Integers
 from . import metadata as bagmeta
 from .mcap_records import NOTES, PROFILE
 from .mcap_writer import McapWriter
-from .metadata import Recorded, WrittenFile, metadata_of
+from .metadata import Recorded, metadata_of
 from .session_file import MOST_HELD
 
 
@@ -48,46 +48,52 @@ LARGEST_MESSAGE = MOST_HELD - 2**20
 """Size limit of a message, bytes. Its chunk holds topic and type, too, and must be readable."""
 
 
-class BagWriter:
-    """Writer of a bag; `close` completes it, `abandon` leaves it as it is.
+FILE_NAME = "session_0.mcap"  # the one file of a bag that this package writes, named as rosbag2 names the first
 
-    Every method raises BagError if the disk is full or fails. After that, call only `abandon`. `notes` are kept in every file
-    and in ``custom_data``. A chunk has `chunk_size` bytes before it is compressed. Raise BagError if `directory` holds
+
+class BagWriter:
+    """Writer of a bag of one file; `close` completes it, `abandon` leaves it as it is.
+
+    Every method raises BagError if the disk is full or fails. After that, call only `abandon`. `notes` are kept in the file and
+    in ``custom_data``. A chunk has `chunk_size` bytes before it is compressed. Raise BagError if `directory` holds
     anything, or cannot be made.
     """
 
     def __init__(
         self, directory: Path, notes: Mapping[str, str] | None = None, distro: str = "jazzy", chunk_size: int | None = None
     ) -> None:
-        self.directory, self._distro = directory, distro
-        self._chunk_size = chunk_size or CHUNK_SIZE
+        self.directory, self.file, self._distro = directory, directory / FILE_NAME, distro
         self._notes = dict(notes or {})
         self.topics: list[Recorded] = []
         self._channels: list[int] = []
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self.counts: Counter[int] = Counter()
         self.sync: Callable[[int], None] = os.fsync  # puts a file that is complete on the disk, by its descriptor
-        self._files: list[WrittenFile] = []
-        self._completed = 0  # bytes of all files but the open one
-        self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
+        self._span: tuple[int, int] | None = None  # first and last log time, ns
         claim_directory(directory)
-        self._open()
-
-    @property
-    def file(self) -> Path:
-        return self.directory / file_name(len(self._files))
+        with self._as_bag_error():
+            self._raw = self.file.open("xb", buffering=0)
+            self._writer = McapWriter(BufferedWriter(self._raw), PROFILE, LIBRARY, chunk_size or CHUNK_SIZE)
+            if self._notes:
+                self._writer.add_metadata(NOTES, self._notes)
 
     def add(self, *topics: Recorded) -> list[int]:
-        """Register topics and return their keys for `write`."""
+        """Write the definitions of topics, types first, and return the topics' keys for `write`."""
         first = len(self.topics)
         self.topics += topics
-        self._register(list(topics))
+        schemas = [(each.type, each.definition_encoding, each.definition) for each in topics]
+        for schema in schemas:
+            if schema not in self._schemas:
+                self._schemas[schema] = self._writer.register_schema(*schema)
+        for each, schema in zip(topics, schemas, strict=True):
+            number = self._schemas[schema]
+            self._channels.append(self._writer.register_channel(each.topic, each.encoding, number, each.details))
         return list(range(first, len(self.topics)))
 
     def write(self, key: int, log_time: int, data: bytes, publish_time: int | None = None, sequence: int = 0) -> None:
         """Append one encoded message of at most `LARGEST_MESSAGE` bytes. Times are in ns; publish time defaults to log time."""
         self.counts[key] += 1
-        self._extend_span(log_time, log_time, 1)
+        self._extend_span(log_time, log_time)
         published = log_time if publish_time is None else publish_time
         with self._as_bag_error():
             self._writer.add_message(self._channels[key], log_time, data, published, sequence)
@@ -101,14 +107,13 @@ class BagWriter:
             own = np.flatnonzero(keys == key)
             sequences[own] = self.counts[key] + np.arange(1, len(own) + 1)
             self.counts[key] += len(own)
-        self._extend_span(int(block.log_times.min()), int(block.log_times.max()), len(keys))
+        self._extend_span(int(block.log_times.min()), int(block.log_times.max()))
         with self._as_bag_error():
             self._writer.add_block(np.array(self._channels)[keys], sequences, block)
 
-    def _extend_span(self, start: int, end: int, count: int) -> None:
-        """Add `count` messages between these log times (ns) to the span of the open file."""
-        first, last, before = self._span or (start, end, 0)
-        self._span = min(first, start), max(last, end), before + count
+    def _extend_span(self, start: int, end: int) -> None:
+        first, last = self._span or (start, end)
+        self._span = min(first, start), max(last, end)
 
     def flush(self) -> int:
         """Give all messages so far to the operating system and return the descriptor of the open file.
@@ -120,64 +125,24 @@ class BagWriter:
         return self._raw.fileno()
 
     @property
-    def size(self) -> int:
-        """Size of the open file on the disk, bytes, without data in memory."""
-        return 0 if self._raw.closed else self._raw.tell()
-
-    @property
     def written(self) -> int:
-        """Size of all files on the disk, bytes."""
-        return self._completed + self.size
-
-    @property
-    def first(self) -> int | None:
-        """First log time (ns) of the open file; None without messages."""
-        return self._span[0] if self._span else None
-
-    def split(self) -> None:
-        """Complete the open file and begin the next one."""
-        with self._as_bag_error():
-            self._finish()
-        self._open()
+        """Size of the file on the disk, bytes, without data in memory."""
+        return 0 if self._raw.closed else self._raw.tell()
 
     def close(self) -> None:
         """Complete the file, then write ``metadata.yaml``."""
         with self._as_bag_error():
-            self._finish()
-            metadata = metadata_of(self._files, self.topics, self.counts, self._notes, self._distro)
+            self._writer.finish()
+            self.sync(self.flush())
+            self._raw.close()
+            counts = [self.counts[key] for key in range(len(self.topics))]
+            metadata = metadata_of(FILE_NAME, self._span or (0, 0), self.topics, counts, self._notes, self._distro)
             bagmeta.write_metadata(self.directory / bagmeta.FILE_NAME, metadata)
 
     def abandon(self) -> None:
         """Close the open file without its end; data in memory are lost."""
         with suppress(OSError):
             self._raw.close()
-
-    def _open(self) -> None:
-        with self._as_bag_error():
-            self._raw = self.file.open("xb", buffering=0)
-            self._buffered = BufferedWriter(self._raw)
-            self._writer = McapWriter(self._buffered, PROFILE, LIBRARY, self._chunk_size)
-            if self._notes:
-                self._writer.add_metadata(NOTES, self._notes)
-            self._channels, self._schemas, self._span = [], {}, None
-            self._register(self.topics)
-
-    def _register(self, topics: list[Recorded]) -> None:
-        """Write all new schemas, then the channels, into the open file."""
-        for each in topics:
-            schema = each.type, each.definition_encoding, each.definition
-            if schema not in self._schemas:
-                self._schemas[schema] = self._writer.register_schema(*schema)
-        for each in topics:
-            number = self._schemas[each.type, each.definition_encoding, each.definition]
-            self._channels.append(self._writer.register_channel(each.topic, each.encoding, number, each.details))
-
-    def _finish(self) -> None:
-        self._writer.finish()
-        self.sync(self.flush())
-        self._completed += self.size
-        self._raw.close()
-        self._files.append(WrittenFile(file_name(len(self._files)), *(self._span or (0, 0, 0))))
 
     @contextmanager
     def _as_bag_error(self) -> Iterator[None]:
@@ -189,14 +154,6 @@ class BagWriter:
     def fault(self, error: OSError) -> BagError:
         """Return the error for a disk that is full or fails."""
         return BagError(f"{self.file}: cannot be written ({error.strerror}). Make room or choose another disk.")
-
-
-def file_name(number: int) -> str:
-    """Return the name of the .mcap file with this number, which counts from 0."""
-    return f"session_{number}.mcap"
-
-
-FILE_NAME = file_name(0)
 
 
 def recorded(topic: Topic) -> Recorded:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="CSV, .parquet, .tdms, .mf4; each keeps its rate")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="CSV or .parquet; each keeps its rate")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the session, new or empty")
     parser.add_argument("--scene", metavar="SCENE", help="scene file (YAML) to keep in the session")
     add_file(parser, "--columns", "which column is which channel and the time, as --propose prints it; names tell the rest")
@@ -36,7 +36,7 @@ def run(args: Namespace) -> int:
     from ..bag.import_session import import_session
     from ..bag.session_model import SessionMetadata, scene_from
     from ..loggers.assignment import ColumnFile, assign, columns_of_options, load_columns
-    from ..loggers.log_table import tables_of
+    from ..loggers.log_table import table_of
     from ..system.result_folder import IMPORT, result_folder
 
     if args.out is None and not args.propose:
@@ -46,7 +46,7 @@ def run(args: Namespace) -> int:
     if scene is not None:
         tell_oddities(scene.oddities, scene.source)
     joints = None if scene is None else len(scene.scene.joints)
-    tables = [table for path in args.files for table in tables_of(path)]
+    tables = [table_of(path) for path in args.files]
     for table in tables:
         tell(f"{table.source}: {table.layout}" if table.layout else table.source)
     if args.propose:

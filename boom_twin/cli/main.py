@@ -32,7 +32,7 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # it looks for the
 COMMANDS: dict[str, str] = {
     "check": "validate a scene and list what its model contains",
     "init": "write a first scene from the dimensions of a drawing",
-    "import": "convert loggers' CSV, Parquet, TDMS, MDF to a session",
+    "import": "convert loggers' CSV and Parquet files to a session",
     "info": "list what a recorded session holds and what it lacks",
     "monitor": "serve the live page, of the topics or of a recorded session",
     "play": "publish a recorded session over ROS 2",

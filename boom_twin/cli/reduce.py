@@ -133,7 +133,7 @@ def _meaning(scene: Scene, edit: Edit) -> str:
     block, number, key = str(edit.place[0]).removesuffix("s"), int(edit.place[1]), str(edit.place[-1])
     what = MEANING.get(key, "")
     if key == "modes":
-        several = f"{edit.value} bending coordinate{'s' * (edit.value != 1)} a part, not {scene.modes_of(number)}"
+        several = f"{edit.value} bending coordinate{'s' * (edit.value != 1)} a part, not {scene.of_section(number, 'modes')}"
         what = several if edit.value else "rigid"
     return f"{block} {number + 1}: {what}"
 

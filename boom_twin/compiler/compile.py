@@ -214,14 +214,14 @@ class _Builder:
         self.layout.operate(program.BODY, row)
 
     def _beam(self, index: int, length: float) -> None:
-        section, n = self.scene.sections[index], self.scene.modes_of(index)
+        section, n = self.scene.sections[index], self.scene.of_section(index, "modes")
         assert section.A is not None and section.I is not None and section.rho_A is not None
         points, basis, share, integrals = _shapes(self.basis, n)
         mass = (section.rho_A + (self.scene.line_fill or 0.0)) * length * share
         turning = (section.rho_I or 0.0) * length * share
         elastic = self.scene.material.E
         part = len(self.beam_tables) + 1
-        axial = int(self.scene.has_axial(index))
+        axial = self.scene.of_section(index, "axial")
         z = self.layout.unknowns([f"q{k + 1}_part{part}" for k in range(n)] + [f"eps_part{part}"] * axial)
         self.scale += [1.0] * n + [length] * axial
         history = self.layout.histories([m for m in mass for _ in range(2)], [m * g for m in mass for g in self.gravity])
@@ -233,7 +233,7 @@ class _Builder:
             bending=n,
             axial=axial,
             points=points,
-            finite=points if self.scene.has_geometric(index) else 0,
+            finite=points if self.scene.of_section(index, "geometric") else 0,
             rotary=points if section.rho_I else 0,
             damped=n + axial if section.beta else 0,
             history=history,

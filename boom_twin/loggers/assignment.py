@@ -11,7 +11,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ..config.yaml_text import read_plain
-from ..errors import BagError, Fault, UsageError, listed
+from ..errors import BagError, Fault, UsageError, bound_of, listed
 from ..types import SENSORS, Stream, channels_of, sensor_kind, stream_of
 from .csv_layout import TIME_UNITS, guess, unit_of
 from .log_table import LogTable
@@ -53,7 +53,7 @@ def columns_from(document: Any, source: str) -> ColumnFile:
         found = ColumnFile.model_validate(document or {})
     except ValidationError as error:
         faults = [
-            Fault(".".join(map(str, each["loc"])), each["input"], each["msg"][:1].lower() + each["msg"][1:], _SEE)
+            Fault(".".join(map(str, each["loc"])), each["input"], bound_of(each["msg"]), _SEE)
             for each in error.errors(include_url=False)
         ]
     else:
@@ -131,8 +131,12 @@ class Assignment:
     def check(self, joints: int, drive: Stream) -> None:
         """Raise BagError for a column without unit, a file without times or channels, and a missing column of `drive`."""
         problems, found = list(self.problems), {use.channel for use in self.used}
-        for number in sorted({use.table for use in self.used}):
-            table, times = self.tables[number], self.times[number]
+        for number, (table, times) in enumerate(zip(self.tables, self.times, strict=True)):
+            if all(use.table != number for use in self.used):
+                told = "; ".join(f"{self.header(use)}: {use.reason}" for use in self.unused if use.table == number)
+                remedy = "Leave it out, or give --column CHANNEL=NAME:UNIT."
+                problems.append(f"{table.source}: no column of a channel ({told}). {remedy}")
+                continue
             if times and [table.names.count(table.names[place]) for place in times] != [1] * len(times):
                 name = table.headers[times[0]]
                 problems.append(
@@ -143,12 +147,6 @@ class Assignment:
                 problems.append(
                     f"{table.source}: no column of times among {told}. Give time: {{column: NAME, unit: s}} in --columns FILE."
                 )
-        sources = {self.tables[use.table].source for use in self.used}
-        for source in dict.fromkeys(table.source for table in self.tables if table.source not in sources):
-            told = "; ".join(
-                f"{self.header(use)}: {use.reason}" for use in self.unused if self.tables[use.table].source == source
-            )
-            problems.append(f"{source}: no column of a channel ({told}). Leave it out, or give --column CHANNEL=NAME:UNIT.")
         driving = channels_of(joints)[drive]
         if (missing := [channel for channel in driving if channel not in found]) and self.used:
             free = "; ".join(f"{self.header(use)} ({use.reason})" for use in self.unused) or "none"

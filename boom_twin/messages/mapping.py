@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 
 from ..config.settings import nearest
 from ..config.yaml_text import read_plain
-from ..errors import Fault, UsageError, listed
+from ..errors import Fault, UsageError, bound_of, listed
 from ..types import NUMBERED_SIDE, SENSORS, Stream, sensor_kind, stream_of
 from .topic_table import InputTopic, Qos, Sensor, SensorPlace, Topic, Topics, default_document, load_topics, used_inputs, usual
 
@@ -186,8 +186,7 @@ def _fault(detail: ErrorDetails, *before: str) -> Fault:
     if detail["type"] == "extra_forbidden":
         near = nearest(place[-1], [*_model_at(place).model_fields])
         return Fault(".".join(place), detail["input"], "unknown key", f"The nearest known key here is `{near}`.")
-    bound = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "it must")
-    return Fault(".".join(place), detail["input"], bound, _REMEDIES.get(place[-1], _SEE))
+    return Fault(".".join(place), detail["input"], bound_of(detail["msg"]), _REMEDIES.get(place[-1], _SEE))
 
 
 def _model_at(place: list[str]) -> type[BaseModel]:
@@ -218,20 +217,22 @@ def _name_faults(topics: Topics) -> Iterator[Fault]:
 def _input_faults(topics: Topics) -> Iterator[Fault]:
     """Yield faults for a delay of what drives the model, whose stamps all outputs have, and for keys of another input."""
     for stream, topic in topics.inputs.items():
-        if (topic.bore or topic.rod) and stream is not Stream.PRESSURES:
-            yield Fault(f"inputs.{stream.value}.bore", topic.bore, "only cylinder_pressures has it", "Remove the key.")
-        if topic.place is not None and SENSORS[stream].is_named:
-            yield Fault(f"inputs.{stream.value}.place", "given", "only IMUs and points have a place", "Remove the key.")
-        if topic.frame_id is not None and SENSORS[stream].is_named:
-            yield Fault(f"inputs.{stream.value}.frame_id", topic.frame_id, "only IMUs and points have it", "Remove the key.")
-        if topic.place is None and SENSORS[stream].is_placed and not SENSORS[stream].is_named:
+        place, keys, is_named = f"inputs.{stream.value}", topic.model_dump(), SENSORS[stream].is_named
+        for key, owner, has_key in (
+            ("bore", "only cylinder_pressures has it", stream is Stream.PRESSURES),
+            ("rod", "only cylinder_pressures has it", stream is Stream.PRESSURES),
+            ("reads", "only cylinder_strokes has it", stream is Stream.STROKES),
+            ("place", "only IMUs and points have it", not is_named),
+            ("frame_id", "only IMUs and points have it", not is_named),
+        ):
+            if keys[key] and not has_key:
+                yield Fault(f"{place}.{key}", keys[key], owner, "Remove the key.")
+        if topic.place is None and SENSORS[stream].is_placed and not is_named:
             told = "it must be there: section, at (m), turned (rad)"
-            yield Fault(f"inputs.{stream.value}.place", None, told, "Give {} for the tip.")
+            yield Fault(f"{place}.place", None, told, "Give {} for the tip.")
         if isnan(topic.delay) and stream in NO_LAG:
             told = "auto is not for forces, pressures and moments: their zeros change with the posture, which hides a lag"
-            yield Fault(f"inputs.{stream.value}.delay", "auto", told, "Give the seconds, or leave the key out.")
-        if topic.reads is not None and stream is not Stream.STROKES:
-            yield Fault(f"inputs.{stream.value}.reads", topic.reads, "only cylinder_strokes has it", "Remove the key.")
+            yield Fault(f"{place}.delay", "auto", told, "Give the seconds, or leave the key out.")
     drive, named = (Stream.ANGLES, "an angle") if topics.drive == "angles" else (Stream.STROKES, "a stroke")
     if delay := topics.inputs[drive].delay:
         bound = f"every output has the stamp of {named} sample, so the other streams' delays count against it"

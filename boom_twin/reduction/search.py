@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Literal
 
 import numpy as np
 
@@ -58,9 +59,9 @@ def _section(key: str, value: bool | int | None, is_there: Callable[[Scene, int]
     return lambda scene, i: (Edit(("sections", i, key), value),) if is_there(scene, i) else ()
 
 
-def _beam(key: str, is_there: Callable[[Scene, int], object]) -> Edits:
+def _beam(key: Literal["axial", "geometric"]) -> Edits:
     """Return edits that turn off a key of a flexible section."""
-    return _section(key, False, lambda scene, i: scene.is_flexible(i) and is_there(scene, i))
+    return _section(key, False, lambda scene, i: scene.is_flexible(i) and scene.of_section(i, key))
 
 
 def _cylinder(*keys: str) -> Edits:
@@ -75,7 +76,7 @@ def _links(scene: Scene, i: int) -> tuple[Edit, ...]:
 
 
 def _fewer_modes(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return (Edit(("sections", i, "modes"), scene.modes_of(i) - 1),) if scene.is_flexible(i) else ()
+    return (Edit(("sections", i, "modes"), scene.of_section(i, "modes") - 1),) if scene.is_flexible(i) else ()
 
 
 _rotary = _section("rho_I", None, lambda scene, i: scene.sections[i].rho_I)
@@ -88,8 +89,8 @@ def _oil_damping(scene: Scene, i: int) -> tuple[Edit, ...]:
 
 KINDS = (
     VariantKind("bending", "section", "rigid", _section("modes", 0, Scene.is_flexible), True),
-    VariantKind("axial coordinate", "section", "without axial coordinate", _beam("axial", Scene.has_axial), True),
-    VariantKind("geometric stiffness", "section", "without geometric stiffness", _beam("geometric", Scene.has_geometric), True),
+    VariantKind("axial coordinate", "section", "without axial coordinate", _beam("axial"), True),
+    VariantKind("geometric stiffness", "section", "without geometric stiffness", _beam("geometric"), True),
     VariantKind("rotary inertia", "section", "without rotary inertia (rho_I)", _rotary, False),
     VariantKind("beam damping", "section", "without beam damping (beta)", _damping, False),
     VariantKind("cylinder compliance", "cylinder", "incompressible", _cylinder("k", "oil", "d"), True),
@@ -109,7 +110,9 @@ def without(scene: Scene, kind: VariantKind, where: Sequence[int]) -> Variant | 
 
 def with_modes(scene: Scene, count: int, where: Sequence[int]) -> Variant | None:
     """Return the scene with `count` bending coordinates a flexible part in sections `where`; None if that is no change."""
-    edits = tuple(Edit(("sections", i, "modes"), count) for i in where if scene.is_flexible(i) and scene.modes_of(i) != count)
+    edits = tuple(
+        Edit(("sections", i, "modes"), count) for i in where if scene.is_flexible(i) and scene.of_section(i, "modes") != count
+    )
     return Variant(f"{_named('section', where, len(scene.sections))} with modes: {count}", "modes", edits) if edits else None
 
 

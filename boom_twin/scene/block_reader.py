@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 
 from ..config.yaml_text import Document, Place, words
-from ..errors import ABSENT, Fault
+from ..errors import ABSENT, Fault, bound_of
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -187,19 +187,14 @@ def _spelling(unit: str) -> str:
 # -- messages about refused values ------------------------------------------------------------------------------------
 
 
-BOUNDS = {
-    "finite_number": "it must be a finite number",
-    "greater_than": "it must be greater than {gt:g}",
-    "greater_than_equal": "it must not be less than {ge:g}",
-    "less_than": "it must be less than {lt:g}",
-    "less_than_equal": "it must not be more than {le:g}",
-    "literal_error": "it must be {expected}",
-    "string_type": "text is needed, not {what}",
-    "tuple_type": "a list is needed, not {what}",
-    "bool_type": "true or false is needed, not {what}",
-    "dict_type": "a block of keys is needed, not {what}",
-    "model_type": "a block of keys is needed, not {what}",
+NEEDED = {
+    "string_type": "text",
+    "tuple_type": "a list",
+    "bool_type": "true or false",
+    "dict_type": "a block of keys",
+    "model_type": "a block of keys",
 }
+"""Kinds of values in the file's terms, by the type of pydantic's error."""
 
 
 def _unknown_key(document: Document, root: type[BaseModel], place: Place, value: Any, model: type[BaseModel]) -> Fault:
@@ -222,7 +217,7 @@ def _unknown_key(document: Document, root: type[BaseModel], place: Place, value:
 
 def _value_fault(document: Document, root: type[BaseModel], detail: ErrorDetails) -> Fault:
     """Return the fault for a pydantic error, in the file's terms."""
-    place, kind, value, limits = detail["loc"], detail["type"], detail["input"], detail.get("ctx", {})
+    place, kind, value = detail["loc"], detail["type"], detail["input"]
     meaning = meaning_at(root, place)
     give = f"Give {meaning}." if meaning else "Give such a value."
     if kind == "missing" and not isinstance(place[-1], int):
@@ -238,7 +233,7 @@ def _value_fault(document: Document, root: type[BaseModel], detail: ErrorDetails
         return document.fault(place, value, bound, _number_remedy(value, give))
     if kind == "string_type":
         give = "Put it in quotes."
-    bound = BOUNDS[kind].format(what=_what(value), **limits) if kind in BOUNDS else detail["msg"]
+    bound = f"{NEEDED[kind]} is needed, not {_what(value)}" if kind in NEEDED else bound_of(detail["msg"])
     return document.fault(place, value, bound, give)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -28,11 +28,6 @@ Mass = Annotated[NotNegative, Field(description="the mass in kg")]
 Inertia = Annotated[NotNegative, Field(description="the inertia about the centre of mass in kg m^2")]
 
 _LAWS = tuple(LAWS)
-if TYPE_CHECKING:
-    LawName = str
-else:
-    LawName = Literal[_LAWS]  # pydantic refuses any other, and names them
-
 IDEAL_BELOW = 1e-6  # m; a pin with less radial clearance is taken for ideal
 DEPTH_BY_GYRATION = 2.4  # depth of a drawn section over its radius of gyration: about that of a thin-walled box
 MODES = "the number of bending coordinates per flexible part: a whole number from 0 to 10"
@@ -239,13 +234,13 @@ class Joint(JointGeometry):
 class ContactLaw(Part):
     """Contact of journal and bush."""
 
-    law: LawName = Field(default="lankarani-nikravesh", description=f"{', '.join(_LAWS[:-1])} or {_LAWS[-1]}")
+    law: Literal[_LAWS] = Field(  # type: ignore[valid-type]
+        default="lankarani-nikravesh", description=f"{', '.join(_LAWS[:-1])} or {_LAWS[-1]}"
+    )
     exponent: float = Field(default=1.5, ge=1.3, le=3, description="the exponent of the penetration, 1.3 to 3; 1.5 for Hertz's")
     restitution: float = Field(default=0.9, gt=0, le=1, description="the coefficient of restitution, above 0 and at most 1")
     friction: float = Field(default=0.0, ge=0, le=2, description="Coulomb's coefficient of friction, 0 to 2")
-    bush: Material | None = Field(
-        default=None, description="a block with E (Pa) and nu of the bush, if it is not of the boom's material"
-    )
+    bush: Material | None = Field(default=None, description="a block with E (Pa) and nu of the bush, if it is another material")
 
     @property
     def given_restitution(self) -> float:
@@ -274,9 +269,7 @@ class Clearance(Part):
 class Tip(Part):
     """Payload of the boom."""
 
-    payload: NotNegative | None = Field(
-        default=None, description="the point mass at the outboard pivot of the last section, kg"
-    )
+    payload: NotNegative | None = Field(default=None, description="the point mass at the tip of the last section, kg")
 
 
 class Scene(SummaryDisplay, Part):
@@ -296,12 +289,8 @@ class Scene(SummaryDisplay, Part):
     joints: tuple[Joint, ...] = Field(min_length=1, description="a list with one block per joint")
     tip: Tip | None = Field(default=None, description="a block with payload (kg)")
     line_fill: NotNegative | None = Field(default=None, description="the concrete in the pipe line, kg/m")
-    clearance: Clearance | None = Field(
-        default=None, description="a block with pins, and contact and treatment if they are not the usual ones"
-    )
-    postures: dict[str, tuple[Finite, ...]] = Field(
-        default={}, description="a block of names, each with a list of section angles in degrees"
-    )
+    clearance: Clearance | None = Field(default=None, description="a block with pins, contact and treatment")
+    postures: dict[str, tuple[Finite, ...]] = Field(default={}, description="a block of names with section angles in degrees")
 
     def with_(self, changes: Mapping[str, Any] | None = None, /, **named: Any) -> Scene:
         """Return the scene with other values, checked as a scene file is: ``scene.with_(payload=40)``.
@@ -348,21 +337,11 @@ class Scene(SummaryDisplay, Part):
         pins = () if self.clearance is None else self.clearance.pins
         return tuple(pin for pin in pins if pin.at.split(".")[0] == owner and pin.radial_clearance >= IDEAL_BELOW)
 
-    def modes_of(self, index: int) -> int:
-        """Return the bending coordinates per flexible part of section `index` (0-based)."""
-        own = self.sections[index].modes
-        return self.modes if own is None else own
-
-    def has_axial(self, index: int) -> bool:
-        """Return True if the flexible parts of section `index` (0-based) stretch."""
-        own = self.sections[index].axial
-        return self.axial if own is None else own
-
-    def has_geometric(self, index: int) -> bool:
-        """Return True if the flexible parts of section `index` (0-based) have geometric stiffness."""
-        own = self.sections[index].geometric
-        return self.geometric if own is None else own
+    def of_section(self, index: int, key: Literal["modes", "axial", "geometric"]) -> int:
+        """Return ``modes``, ``axial`` or ``geometric`` of section `index` (0-based): its own value, else the boom's."""
+        own = getattr(self.sections[index], key)
+        return int(getattr(self, key) if own is None else own)
 
     def is_flexible(self, index: int) -> bool:
         """Return True if section `index` (0-based) bends."""
-        return self.sections[index].beam is not None and self.modes_of(index) > 0
+        return self.sections[index].beam is not None and self.of_section(index, "modes") > 0

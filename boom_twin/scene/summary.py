@@ -45,8 +45,10 @@ def _absent_in_section(scene: Scene, i: int) -> dict[str, str]:
     else:
         absent = {} if section.beta else {"beta": "no damping of the beam"}
         absent |= {} if section.rho_I else {"rho_I": "no rotary inertia of the beam"}
-        absent |= {} if scene.has_axial(i) else {"axial": "false, so the beam does not stretch"}
-        absent |= {} if scene.has_geometric(i) else {"geometric": "false, so bending is linear, without geometric stiffness"}
+        if not scene.of_section(i, "axial"):
+            absent["axial"] = "false, so the beam does not stretch"
+        if not scene.of_section(i, "geometric"):
+            absent["geometric"] = "false, so bending is linear, without geometric stiffness"
     for key, end in (("root", "inboard"), ("head", "outboard")):
         if getattr(section, key) is None:
             absent[key] = f"the rigid {end} part has no mass"
@@ -182,7 +184,7 @@ def _fill_mass(scene: Scene, section: Section) -> float:
 
 def _section(scene: Scene, i: int) -> SectionAccount:
     section, parts = scene.sections[i], flexible_parts(scene, i)
-    bending, axial = scene.modes_of(i) if parts else 0, int(bool(parts) and scene.has_axial(i))
+    bending, axial = scene.of_section(i, "modes") if parts else 0, scene.of_section(i, "axial") if parts else 0
     return SectionAccount(i + 1, section, parts, splits(scene, i), bending, axial, _fill_mass(scene, section))
 
 

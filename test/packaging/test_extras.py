@@ -14,7 +14,7 @@ COMMANDS = {
     "pyarrow, table": ("pyarrow", ["replay", ARCH, "--table", "parquet"], "pip install pyarrow"),
     "rainflow": ("rainflow", ["replay", ARCH, "--report", "--fatigue", "80"], "boom_twin[fatigue]"),
     "exudyn": ("exudyn", ["rig"], "boom_twin[peers]"),
-    "nptdms": ("nptdms", ["import", "log.tdms"], "boom_twin[import]"),
+    "pyarrow, import": ("pyarrow", ["import", "log.parquet"], "boom_twin[import]"),
 }
 
 
@@ -24,7 +24,7 @@ def test_a_missing_package_is_named_with_what_installs_it(
 ) -> None:
     package, arguments, remedy = COMMANDS[case]
     monkeypatch.chdir(tmp_path)
-    Path("log.tdms").write_bytes(b"TDSm")
+    Path("log.parquet").write_bytes(b"PAR1")
     for name in [name for name in sys.modules if name.startswith("boom_twin.validation.rig")]:
         monkeypatch.delitem(sys.modules, name)  # imported anew without exudyn
     monkeypatch.setitem(sys.modules, package, None)

@@ -45,7 +45,7 @@ def test_changes_are_validated_and_the_scene_stays() -> None:
     assert heavy.tip is not None and heavy.tip.payload == 40.0 and heavy.line_fill == 10.0
     assert load_scene() == SCENE and heavy.with_(payload=None).tip != heavy.tip
     assert SCENE.with_({"cylinder_2.k": 1e7}).joints[1].cylinder.k == 1e7
-    with pytest.raises(SceneError, match=r"tip\.payload = -4\.0: it must not be less than 0"):
+    with pytest.raises(SceneError, match=r"tip\.payload = -4\.0: it must be greater than or equal to 0"):
         SCENE.with_(payload=-4)
     with pytest.raises(SceneError, match="modes"):
         SCENE.with_(modes=99)

@@ -56,14 +56,14 @@ def test_cylinders_cover_the_range_and_postures_are_in_it(tmp_path: Path) -> Non
     [
         ("wall: 6 mm", "wall: 6", "sections[1].wall", "two walls fill the box"),
         ("wall: 6 mm", "wall: 6 kg", "sections[1].wall", "`kg` is no unit of this key, which is in m"),
-        ("bore: 180 mm", "bore: 180", "joints[0].bore", "not be more than 1"),
+        ("bore: 180 mm", "bore: 180", "joints[0].bore", "less than or equal to 1"),
         ("rod: 120 mm", "rod: 220 mm", "joints[1].rod", "thinner than the bore"),
         ("height: 450 mm", "hight: 450 mm", "sections[1].hight", "nearest known key here is `height`"),
         ("lL: 974 mm", "lL: 97.4 mm", "joints[1].range_deg", "do not meet at any angle"),
         ("D: [-362 mm, -55 mm],", "", "joints[1].D", "needs it"),
         ("rho: 7850 kg/m^3", "nu: 0.3", "material.rho", "masses are computed from it"),
         ("kind: B1", "kind: A", "joints[1].kind", "only joint 1"),
-        ("bulk_modulus: 1.4 GPa", "bulk_modulus: 14000", "bulk_modulus", "it must not be less than 1e+07"),
+        ("bulk_modulus: 1.4 GPa", "bulk_modulus: 14000", "bulk_modulus", "it must be greater than or equal to 10000000"),
         ("damping_ratio: 0.01", "damping_ratio: 1", "damping_ratio", "it must be less than 1."),
         (
             "range_deg: [-165, 10], bore: 140 mm",

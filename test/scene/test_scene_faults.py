@@ -15,7 +15,7 @@ from boom_twin.errors import ABSENT
 # Each row: the place that is edited and, if it is another one, the place of the fault; the new value; words of the message.
 
 SINGLE_VALUES = [
-    ("sections[1].root.mass", -12.0, "-12.0", "not be less than 0", "mass in kg"),
+    ("sections[1].root.mass", -12.0, "-12.0", "greater than or equal to 0", "mass in kg"),
     ("sections[1].length", 0, "greater than 0", "pivot to pivot"),
     ("sections[1].length", math.nan, "nan", "finite"),
     ("sections[1].A", "3.9e-3", "not text", "without quotes: 3.9e-3"),
@@ -28,7 +28,7 @@ SINGLE_VALUES = [
     ("sections[1].root.mass", GONE, "is absent", "needed", "kg"),
     ("sections[1].modes", 2.5, "a whole number is needed, not a decimal number"),
     ("gravity", GONE, "is absent", "m/s^2"),
-    ("material.nu", 0.6, "not be more than 0.5"),
+    ("material.nu", 0.6, "less than or equal to 0.5"),
     ("material.name", 345, "text is needed", "quotes"),
     ("sections", [], "is absent", "one block per section"),
     ("joints", GONE, "is absent", "one block per joint"),
@@ -59,12 +59,12 @@ CONTRADICTIONS = [
     ("joints[1].side", "up", "'up'", "'left' or 'right'", "where the links meet"),
     ("joints[1].cylinder.oil", OIL, "k = 3e+07 N/m too", "Remove k, or remove oil"),
     ("joints[1].cylinder.oil -> joints[1].cylinder.oil.rod", OIL | {"rod": 0.1}, "thinner than the bore, 0.1 m", "diameters"),
-    ("joints[1].cylinder.oil -> joints[1].cylinder.oil.bore", OIL | {"bore": 160}, "not be more than 1", "piston, m"),
+    ("joints[1].cylinder.oil -> joints[1].cylinder.oil.bore", OIL | {"bore": 160}, "less than or equal to 1", "piston, m"),
     ("joints[1].cylinder.max_stroke", GONE, "is absent", "the largest stroke, m"),
     ("joints[1].cylinder.k -> joints[1].cylinder.d", GONE, "90000.0", "incompressible", "Give k", "remove d"),
     ("joints[1].range_deg", [10, -165], "low < high", "lower angle first"),
     ("joints[1].range_deg", [-2.88, 0.17], "within 6.28 degrees", "these radians would be [-165, 9.74]"),
-    ("base.inclination", 5.0, "not be more than 1.571", "in rad, or with its unit, like 5 deg"),
+    ("base.inclination", 5.0, "less than or equal to 1.571", "in rad, or with its unit, like 5 deg"),
     ("postures.arch", [60, 20, -30], "it has 3 angles", "4 sections", "one angle per section"),
     ("joints[1].D", [-0.4, -0.04], "rigid head of sections[0]", "x >= -0.26", "x1 <= 3.46"),
     ("joints[1].E", [0.3, 0.062], "rigid root of sections[1]", "x <= 0.25", "x0 >= 0.3"),

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from command import main
-from default_boom import clearance_text, default_text, example_names, example_text, with_end_mark
+from default_boom import clearance_text, default_text, example_names, example_text
 from scene.editing import OIL, put
 
 from boom_twin import SceneError, load_scene
@@ -26,7 +26,6 @@ UNITS = [
     ("joints[1].cylinder.oil -> joints[1].cylinder.oil.cap_line", OIL | {"cap_line": 2.0}, "litres?", "1e-3"),
     ("joints[1].cylinder.oil -> joints[1].cylinder.oil.rod_line", OIL | {"rod_line": 0.0}, "full stroke, 0.42 m"),
     ("gravity", [0.0, -1.62], "9.81", "[0.0, -9.81]"),
-    ("gravity", [0.0, 9.81], "upwards"),
     ("postures.bent", [1.05, 0.35, -0.52, -1.4], "radians?", "degrees"),
 ]  # fmt: skip
 
@@ -35,7 +34,6 @@ GEOMETRY = [
      "closed_length 1.086 and max_stroke 0.812"),
     ("joints[1].lL -> joints[1].range_deg", 0.55, "do not meet at -165.0 to -115.4 deg", "Narrow range_deg to [-49, 10]",
      "|lL - lR| = 0.173 m must be less"),
-    ("sections[0].rod_pin", [0.61, -0.12], "splits the beam 10 mm from its end", "x = 0.61"),
     ("sections[1].head.com", [-3.18, 0.0], "inside the head", "INBOARD pivot"),
 ]  # fmt: skip
 
@@ -43,7 +41,7 @@ SLIPS = [
     ("joints[0].cylinder.k", 40e3, "kN/m?", "4e+07"),
     ("joints[0].cylinder.k", 4e8, "a bore of 0.26 m", "at most 0.165 m"),
     ("joints[1].cylinder.k", 3e6, "gives way by", "2 % of its stroke"),
-    ("joints[0].cylinder.d", 120.0, "would damp a mode of"),
+    ("joints[0].cylinder.d", 120.0, "alone it damps a mode of 0.95 Hz by"),
     ("sections[2].beta", 0.02, "2 zeta / omega"),
     ("sections[0].I", 0.00036, "sqrt(I/A)", "expected"),
     ("sections[1].height -> sections[1].I", 17.2, "for a box 17.2 m high"),
@@ -64,7 +62,7 @@ SLIPS = [
     ("material.E", 7e10, "1.7e+11 to 2.3e+11", "density of steel"),
     ("line_fill", 400.0, "whole load"),
     ("joints[1].cylinder.max_stroke", 1.13, "not the open length"),
-    ("tip -> tip.payload", {"payload": 40000.0}, "half of what the boom weighs"),
+    ("tip -> tip.payload", {"payload": 40000.0}, "grams?", "line_fill"),
 ]  # fmt: skip
 
 
@@ -158,13 +156,6 @@ def test_c_measured_from_the_wrong_pivot_is_pointed_out(bench: Any) -> None:
     assert "OUTBOARD" in oddity.remedy and "warning: line" in str(caught.value)
 
 
-@pytest.mark.parametrize("path", ["modes", "sections[1].modes"])
-def test_a_single_bending_coordinate_warns_of_what_it_costs(bench: Any, path: str) -> None:
-    (oddity,) = bench.oddities(lambda values: put(values, path, 1))
-    assert oddity.path == path and "21 %" in oddity.bound and "Take 2 or 3" in oddity.remedy
-    assert bench.oddities(lambda values: put(values, path, 2)) == []
-
-
 def test_incompressible_cylinders_are_not_called_too_stiff(bench: Any) -> None:
     """What is left out of the model is no slip."""
 
@@ -178,7 +169,7 @@ def test_incompressible_cylinders_are_not_called_too_stiff(bench: Any) -> None:
 
 def test_sound_scenes_have_no_warning(bench: Any) -> None:
     whole = (Path(__file__).parents[2] / "examples" / "two_section_boom.yaml").read_text(encoding="utf-8")
-    clearance = with_end_mark(f"{default_text()}\n{clearance_text()}")
-    loaded = with_end_mark(f"{default_text()}\nline_fill: 20.0\ntip: {{payload: 40.0}}")
+    clearance = f"{default_text()}\n{clearance_text()}"
+    loaded = f"{default_text()}\nline_fill: 20.0\ntip: {{payload: 40.0}}"
     for text in (default_text(), clearance, whole, loaded, *map(example_text, example_names())):
         assert main(["check", "--strict", str(bench.text(text))]) == 0

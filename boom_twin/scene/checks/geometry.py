@@ -16,7 +16,6 @@ from ...config.yaml_text import Place
 from ...types import Array
 from ..kinematics import joint_curve, linkage
 from ..schema import Joint, Point, Scene
-from ..segmentation import cylinder_pins
 from . import Draft, Findings
 
 ROUNDING = 1e-9  # m, deg
@@ -52,21 +51,6 @@ def placed_pins(draft: Draft) -> Findings:
 def _bending(scene: Scene, i: int) -> Point:
     """Return the ends of the flexible part of section `i`; inf, -inf if it is rigid."""
     return scene.sections[i].beam or RIGID if scene.is_flexible(i) else RIGID
-
-
-def thin_parts(draft: Draft) -> Findings:
-    """Yield warnings of pins just beside an end of the beam, which cut off a sliver of it."""
-    scene = draft.scene
-    for i, section in enumerate(scene.sections):
-        beam = _bending(scene, i)
-        for pin in cylinder_pins(scene, i):
-            for end in beam if beam[0] < pin.x < beam[1] else ():
-                if ROUNDING < abs(pin.x - end) < 0.01 * section.length:
-                    place: Place = ("joints", pin.cylinder, "C") if pin.cylinder else ("sections", 0, "rod_pin")
-                    value = scene.joints[pin.cylinder].C if pin.cylinder else section.rod_pin
-                    bound = f"the pin splits the beam {abs(pin.x - end) * 1e3:.3g} mm from its end, at x = {end:g} m"
-                    remedy = f"Let the beam end at the pin, x = {pin.x:.6g} m, or move the pin."
-                    yield draft.warning(place, value, bound, remedy)
 
 
 def _far(length: float, point: Point) -> bool:

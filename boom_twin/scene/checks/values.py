@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 
-from ...config.yaml_text import Place
 from ...errors import ABSENT
 from ..block_reader import meaning_of
 from ..schema import Base, Cylinder, Joint, Oil, Point, Section
@@ -77,20 +76,6 @@ def _rod_pin(draft: Draft, i: int, section: Section) -> Findings:
     if i > 0 and section.rod_pin is not None:
         bound = "only the first section has a rod pin; the later cylinders push on links"
         yield draft.fault(place, section.rod_pin, bound, f"Remove it; R in joints[{i}] places the pin on a link.")
-
-
-def modes(draft: Draft) -> Findings:
-    """Yield a warning of a single bending coordinate: a part then bends as under a constant moment only."""
-    beams = [(i, section.modes) for i, section in enumerate(draft.scene.sections) if section.beam is not None]
-    places: list[Place] = [("sections", i, "modes") for i, own in beams if own == 1]
-    if draft.scene.modes == 1 and any(own is None for _, own in beams):
-        places.insert(0, ("modes",))
-    for place in places:
-        bound = (
-            "a part then bends to a circle only. With 1 in all sections of the default scene the deflection at rest is up to "
-            "1.1 % off, frequencies 1 to 6 up to 9.9 %, and in its reference move the tip 7 mm and its acceleration 21 %"
-        )
-        yield draft.warning(place, 1, bound, "Take 2 or 3, or `boom_twin check --need` to see what can be left out.")
 
 
 def joints(draft: Draft) -> Findings:

@@ -1,4 +1,4 @@
-"""Plausibility of the whole boom: payload, pressures; stretched out its first frequencies, their damping, the give of oil.
+"""Plausibility of the stretched-out boom: pressures, the give of oil, its first natural frequency and the damping of it.
 
 The stretched-out boom is estimated by the flexibility of a cantilever, also for first guesses. It lies along x (a joint that
 cannot be straight is at the end of its range). Its beams are cut into cells that bend, its cylinders are springs in the joints,
@@ -24,7 +24,8 @@ from ..schema import Scene
 from . import Draft, Findings
 
 FREQUENCY = (4.0, 70.0)  # first one times the length of the boom, m/s
-QUICK = 5.0  # Hz; of a short boom, whose second mode is above, the first mode or this frequency counts
+DAMPING = (2e-4, 0.05)  # damping ratio of the first mode by one part alone
+FASTEST = 5.0  # Hz; damping is judged at this frequency if the first mode is faster, as of a short boom
 PRESSURE = (2.0, 45.0)  # MPa, of the chamber that bears the stretched-out boom; placing booms have up to 30 to 40 MPa
 
 
@@ -37,14 +38,14 @@ TAKES = frozenset(
 def whole_boom(draft: Draft, odd: Sequence[str]) -> list[Fault]:
     """Return the first implausibility that only all parts together show.
 
-    Payload, pressure, oil, frequency and damping are checked in this order: the first that is irregular causes what follows.
+    Pressure, oil, frequency and damping are checked in this order: the first that is irregular causes what follows.
     `odd` are paths that have a finding already.
     """
     if any(path.rpartition(".")[2] in TAKES for path in odd):
         return []
     scene = draft.scene
     found = straight_boom(scene, np.array([joint.cylinder.middle_stiffness for joint in scene.joints]))
-    checks = (_payload, _pressure, _give, _stiff, _frequency, _damping)
+    checks = (_pressure, _give, _stiff, _frequency, _damping)
     turned = [path.removesuffix("range_deg") for path in odd if path.endswith("range_deg")]  # joints whose levers are no use
     findings = ([each for each in check(draft, scene, found) if not each.path.startswith(tuple(turned))] for check in checks)
     return next(filter(None, findings), [])
@@ -61,30 +62,22 @@ def _frequency(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
 
 
 def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
-    """Yield warnings of the damping of each part, then of all together; none where no damping is given at all."""
-    tiny = 1e-300
-    part_damping = (2e-4, 0.2)  # what one part alone would give the first mode, at least, and the second, at most
+    """Yield a warning of each part by whose damping alone the first mode has a damping ratio outside `DAMPING`."""
     if not len(found.frequencies):
         return
-    parts: list[tuple[Place, float, float]] = []
+    parts: list[tuple[Place, float, float]] = []  # place, value, and the stiffness that it is a multiple of; beta has 1
     for i, (section, joint) in enumerate(zip(scene.sections, scene.joints, strict=True)):
-        if section.beta:
-            parts.append((("sections", i, "beta"), section.beta, section.beta))
-        if joint.cylinder.d:
-            delay = joint.cylinder.d / joint.cylinder.middle_stiffness
-            parts.append((("joints", i, "cylinder", "d"), joint.cylinder.d, delay))
-    if scene.base.damping and scene.base.stiffness:
-        parts.append((("base", "damping"), scene.base.damping, scene.base.damping / scene.base.stiffness))
-    slow, quick = found.frequencies[[0, min(1, len(found.frequencies) - 1)]].tolist()
-    first, second = math.pi * slow, math.pi * max(slow, min(quick, QUICK))
-    odd = [part for part in parts if first * part[2] < part_damping[0] or second * part[2] > part_damping[1]]
-    for place, value, delay in odd:
-        pace = second if delay * second > part_damping[1] else first
-        low, high = (limit * value / (each * delay or tiny) for limit, each in zip(part_damping, (first, second), strict=True))
-        damped = f"a mode of {pace / math.pi:.2g} Hz by {100 * pace * delay:.2g} %"
-        bound = f"alone it would damp {damped}; expected {low:.2g} to {high:.2g}"
-        remedy = "beta is 2 zeta / omega (s), zeta the damping ratio; d, and damping of a base, are that times the stiffness."
-        yield draft.warning(place, value, bound, remedy)
+        parts.append((("sections", i, "beta"), section.beta or 0.0, 1.0))
+        parts.append((("joints", i, "cylinder", "d"), joint.cylinder.d or 0.0, joint.cylinder.middle_stiffness))
+    parts.append((("base", "damping"), scene.base.damping or 0.0, scene.base.stiffness or math.inf))
+    frequency = min(float(found.frequencies[0]), FASTEST)
+    remedy = "beta is 2 zeta / omega (s), zeta the damping ratio; d, and damping of a base, are that times the stiffness."
+    for place, value, stiffness in parts:
+        if value > 0.0 and 0.0 < stiffness < math.inf:
+            ratio = math.pi * frequency * value / stiffness
+            says = f"alone it damps a mode of {frequency:.2g} Hz by {100 * ratio:.2g} %; "
+            unit = stiffness / (math.pi * frequency)  # of `value`, per damping ratio
+            yield from draft.expect(place, value, DAMPING, unit, "", remedy, says=says)
 
 
 def _pressure(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
@@ -127,13 +120,6 @@ def _stiff(draft: Draft, scene: Scene, _found: StraightBoom) -> Findings:
         where, remedy = f" m beside a section {depth:.2g} m high", "Check k (N/m), and its decimals."
         place, limits = ("joints", i, "cylinder", "k"), (0.0, widest_bore)
         yield from draft.expect(place, k, limits, depth, where, remedy, measured=bore, says=says)
-
-
-def _payload(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
-    most_payload = 0.5  # of the boom's mass
-    if (boom := found.mass - scene.payload) > 0.0:
-        where, remedy = " kg, half of what the boom weighs", "Give kg; concrete in the pipe line is line_fill."
-        yield from draft.expect(("tip", "payload"), scene.payload, (0.0, most_payload), boom, where, remedy)
 
 
 # -- estimate of the stretched-out boom ----------------------------------------------------------------------------------
