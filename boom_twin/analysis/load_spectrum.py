@@ -79,14 +79,17 @@ class TipLoad:
 
     @property
     def text(self) -> str:
-        """Load in words: ``pulses of 128 N (+- 14) at 0.430 Hz (+- 0.001)``, or its size, or ``none above 20 N``."""
+        """Load in words: ``pulses of 128 N (+- 14) at 0.430 Hz (+- 0.001)``, or its size, or an upper bound.
+
+        A load that is there from the start looks like a change of drives, so that the bound does not hold for it.
+        """
         if self.pulses is not None:
             digits = min(max(1, int(np.ceil(-np.log10(self.pulses.frequency_sigma)))), 4)
             sure = f"{self.pulses.frequency:.{digits}f} Hz (+- {self.pulses.frequency_sigma:.{digits}f})"
             return f"pulses of {self.pulses.height:.0f} N (+- {self.pulses.height_sigma:.0f}) at {sure}"
         if self.is_there:
             return f"{self.rms:.0f} N rms (+- {self.sigma:.0f}), no main frequency"
-        return f"none above {self.bound:.0f} N"
+        return f"none above {self.bound:.0f} N after the start"
 
 
 def find_pulses(load: Array, interval: float) -> Pulses | None:
