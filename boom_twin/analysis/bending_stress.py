@@ -12,6 +12,7 @@ modulus, of bending alone: no axial force, no notches, no welds.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -86,7 +87,7 @@ def increments_by_tip_force(plan: Plan, state: State, work: Work) -> Array:
     """Return increments of the unknowns by x and y of a force at the tip (N) at rest, (unknowns, 2); `state` is kept."""
     t, still = plan.tables, np.zeros(plan.joints)
     place(t, state, work)
-    motion, last = Motion(0.0, 0.0, work.position.copy(), np.zeros_like(work.position)), np.int64(len(t.operations))
+    motion, last = Motion(0.0, 0.0, work.position.copy(), np.zeros_like(work.position)), len(t.operations)
     load_pins(t, state, work, motion)
     found = []
     for force in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)):
@@ -107,17 +108,12 @@ class BendingStresses:
     stress_sigmas: Array  # standard deviations by the load at the tip, NaN without an estimate
 
 
-def section_moduli(scene: Scene) -> Array:
-    """Return the section modulus 2 I / height of every section, shape (n,), m^3; NaN of a rigid one.
+def section_moduli(scene: Scene, places: Sequence[Station]) -> Array:
+    """Return the section modulus 2 I / height at k stations, shape (k,), m^3.
 
     Heights are those of the scene, or those of thin-walled boxes.
     """
-    found = np.full(len(scene.sections), np.nan)
-    for i, section in enumerate(scene.sections):
-        if scene.is_flexible(i):
-            assert section.I is not None
-            found[i] = 2.0 * section.I / section.depth
-    return found
+    return np.array([2.0 * (own.I or 0.0) / own.depth for own in (scene.sections[place.section] for place in places)])
 
 
 class BendingStressModel:
@@ -130,7 +126,7 @@ class BendingStressModel:
         self.stations: tuple[Station, ...] = stations(scene)
         if not self.stations:
             raise UsageError("sections: none of the scene is flexible, so it has no bending moments. Give a section a beam.")
-        self.moduli = section_moduli(scene)[[station.section for station in self.stations]]
+        self.moduli = section_moduli(scene, self.stations)
         self._plan, self._reads = compile_scene(scene), reads
         self._by_unknowns = moments_by_unknowns(self._plan)
         self._state, self._work = self._plan.state(), self._plan.work()

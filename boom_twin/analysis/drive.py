@@ -13,14 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiler.plan import Plan, first_row, taken_apart, width_of
+from ..compiler.plan import Plan
 from ..errors import SolverError
 from ..kernels.elements.cylinder import write_drives
 from ..kernels.elements.pin_contact import LOST
 from ..kernels.integrators import GENERALISED_ALPHA
 from ..kernels.result_row import Results
 from ..kernels.tables import State, Work
-from ..kernels.transfer.time_step import run
+from ..kernels.transfer.time_step import observe, run
 from ..system.result_text import numbers
 from ..types import Array, StrokeReading
 
@@ -58,7 +58,7 @@ def _end(near: Array, far: Array, first: Array, second: Array) -> Array:
 
 
 STEP_TOLERANCE = 1e-6  # rad, increment in the last pass; the remaining error is about 1 to 50 times its square
-PASSES = np.int64(20)
+PASSES = 20
 
 
 class Run(NamedTuple):
@@ -103,8 +103,8 @@ class DriveCourse:
     def stepped(self, rows: NDArray[np.int64], dt: float, finer: int = 1) -> Run:
         """Simulate through `rows` in steps of at most `dt` (s), each divided by `finer`. Steps end on the rows."""
         plan, state = self.plan, State(*(array.copy() for array in self.start))
-        out = np.empty((len(rows), width_of(plan)))
-        out[0] = first_row(plan, state)
+        out = np.empty((len(rows), plan.row_width))
+        observe(plan.tables, state, out[0])
         steps, counts, drives, rates, loads = self.steps(rows, dt, finer)
         self.work.load[:] = self.first_load
         status, row, passes, jolt, shake = run(
@@ -113,7 +113,7 @@ class DriveCourse:
         )  # fmt: skip
         at_rows = np.vstack([self.start.drives[1], rates[np.cumsum(counts) - 1]])
         return Run(
-            int(status), int(row), taken_apart(plan, out), passes / max(int(counts.sum()), 1), jolt, shake,
+            int(status), int(row), plan.results(out), passes / max(int(counts.sum()), 1), jolt, shake,
             float(counts @ steps**2), float(steps.max(initial=0.0)), at_rows, state.contacts[:, LOST].astype(np.int64), state,
         )  # fmt: skip
 

@@ -14,7 +14,6 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ..compiler.compile import compile_scene
-from ..compiler.plan import first_row, taken_apart
 from ..errors import SolverError
 from ..scene.kinematics import posture_angles, rigid_chain, strokes_of_angles
 from ..scene.schema import Scene
@@ -113,7 +112,7 @@ class _Boom:
             self.skipped["no equilibrium"] += 1
             return None
         tip, (headings, pivots) = state.frames[-1, :2], rigid_chain(*self._chain, relative)
-        forces = taken_apart(plan, first_row(plan, state)).cylinder_forces
+        forces = plan.observed(state).cylinder_forces
         moments = _largest(self._bending @ bent, self._owners, plan.joints)
         deflection, frequencies = np.hypot(*(tip - pivots[-1])), [mode.frequency for mode in found]
         return np.concatenate([np.degrees(headings), tip, [deflection], forces, moments, frequencies])

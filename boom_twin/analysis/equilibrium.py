@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..compiler.compile import compile_scene
-from ..compiler.plan import Plan, first_row, taken_apart
+from ..compiler.plan import Plan
 from ..errors import SolverError, UsageError
 from ..kernels.elements.linkage import link_angles
 from ..kernels.elements.pin_contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
 from ..kernels.integrators import REST, X, prepare
 from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
-from ..kernels.transfer.time_step import ANEW, advance
+from ..kernels.transfer.time_step import advance
 from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes, plain, posture_angles, skeleton, strokes_of_posture
 from ..scene.load import SceneSource, as_scene
@@ -90,7 +90,7 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
 
 
 TOLERANCE = 1e-9  # rad, increment in the last pass; the remaining error is its square
-PASSES = np.int64(60)  # typed, see `kernels.transfer.time_step.ANEW`
+PASSES = 60
 LONGEST_INCREMENT = 0.1  # rad per pass
 
 
@@ -189,7 +189,7 @@ def statics(
     else:
         raise UsageError("give one of strokes, posture and lengths, not two.")
     plan, state, work = rest_at(scene, strokes, angles)
-    found = taken_apart(plan, first_row(plan, state))
+    found = plan.observed(state)
     undeformed, tip = skeleton(scene, angles).pivots[-1], state.frames[-1, :2].copy()
     return Equilibrium(
         strokes=strokes,
@@ -240,7 +240,7 @@ def drives_at_rest(scene: Scene, lengths: Array, angles: Array) -> Array:
     of the oil springs.
     """
     struts, state, _ = rest_at(with_rigid_cylinders(scene), lengths, angles)
-    return spring_free(compile_scene(scene), lengths, taken_apart(struts, first_row(struts, state)).cylinder_forces)
+    return spring_free(compile_scene(scene), lengths, struts.observed(state).cylinder_forces)
 
 
 def travel_words(i: int, most: float) -> str:
@@ -318,7 +318,7 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
     loaded = plan if load == 1.0 else replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
     scheme, still = prepare(REST, 0.0, 0.0, work.weights), np.zeros(plan.joints)
     state.history[X, plan.tables.parts.history + 2] = 0.0  # barrels and rods: within half a turn after failed attempts
-    status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
+    status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None, False)
     return bool(status == OK and is_stable(loaded, state, work))
 
 

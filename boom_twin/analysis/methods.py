@@ -18,12 +18,11 @@ from typing import Literal
 import numpy as np
 
 from ..compiler.compile import BasisName, compile_scene
-from ..compiler.plan import first_row, taken_apart, width_of
 from ..errors import UsageError
 from ..kernels import integrators
 from ..kernels.tables import OK, SENTENCES
 from ..kernels.transfer.matrix_product import new_product
-from ..kernels.transfer.time_step import run
+from ..kernels.transfer.time_step import observe, run
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, stroke_curve, strokes_of_angles, strokes_of_posture
 from ..scene.load import load_scene
 from ..scene.schema import Scene
@@ -51,7 +50,7 @@ class Method:
 
     integrator: str = "generalised-alpha"  # key of `FAMILIES`
     parameter: float = RHO  # rho of generalised-alpha, gamma of Newmark, theta of Wilson; Houbolt and Park have none
-    passes: int = int(PASSES)  # largest number of Newton passes in a step; 1 is the papers' linearised pass
+    passes: int = PASSES  # largest number of Newton passes in a step; 1 is the papers' linearised pass
     tolerance: float = STEP_TOLERANCE  # rad, see `kernels.transfer.time_step.advance`
     product: Literal["riccati", "plain"] = "riccati"  # plain: the papers' product of transfer matrices
 
@@ -102,17 +101,17 @@ def integrate_with(
     depth, first = integrators.depth_of(FAMILIES[method.integrator]), drive(np.zeros(1))[0][0]
     state, work = plan.state(depth), plan.work(depth)
     settle(plan, state, work, first, joint_angles_of_strokes(scene, first, near=angles))
-    out = np.full((rows + 1, width_of(plan)), np.nan)
-    out[0] = first_row(plan, state)
+    out = np.full((rows + 1, plan.row_width), np.nan)
+    observe(plan.tables, state, out[0])
     product = new_product(plan.tables) if method.product == "plain" else None
     strokes, rates = drive(np.asarray(step * (np.arange(rows * every) + method.reach), float))
     steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
     begun = time.process_time()
     status, row, passes, jolt, shake = run(
         plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, np.zeros((0, 2)),
-        FAMILIES[method.integrator], method.parameter, method.tolerance, np.int64(method.passes), product, out[1:],
+        FAMILIES[method.integrator], method.parameter, method.tolerance, method.passes, product, out[1:],
     )  # fmt: skip
-    seconds, found, is_done = time.process_time() - begun, taken_apart(plan, out), int(status) == OK
+    seconds, found, is_done = time.process_time() - begun, plan.results(out), int(status) == OK
     tip = found.tip
     travel = float(np.linalg.norm(tip[:, 0, :2] - tip[0, 0, :2], axis=1).max())
     return MethodRun(

@@ -77,6 +77,21 @@ class Plan:
         """Number of joints, and of sections."""
         return len(self.tables.joints)
 
+    @property
+    def row_width(self) -> int:
+        """Numbers of a row of results, see `boom_twin.kernels.result_row`."""
+        return int(row_width(self.joints, len(self.pins)))
+
+    def results(self, rows: Array) -> Results:
+        """Return rows as the kernels wrote them, shape (.., row_width), by name."""
+        return results_of(rows, self.joints, len(self.pins))
+
+    def observed(self, state: State) -> Results:
+        """Return the results of the instant in `state`."""
+        row = np.zeros(self.row_width)
+        observe(self.tables, state, row)
+        return self.results(row)
+
     def compliances_and_lags(self, drives: Array) -> tuple[Array, Array]:
         """Return 1/k (m/N; 0 if incompressible) and d/k (s) of cylinders whose `drives` are so long (m); all of shape (n,)."""
         cylinders, oils = self.tables.cylinders, self.tables.oils
@@ -119,20 +134,3 @@ class Plan:
             corrections=np.zeros((CORRECTIONS, len(self.names))), kept_z=np.zeros(len(self.names)), kept=np.zeros(4),
             cut=np.zeros(SLOTS),
         )  # fmt: skip
-
-
-def width_of(plan: Plan) -> int:
-    """Numbers of a row of results, see `boom_twin.kernels.result_row`."""
-    return int(row_width(plan.joints, len(plan.pins)))
-
-
-def first_row(plan: Plan, state: State) -> Array:
-    """The instant in `state` as a row of results."""
-    row = np.zeros(width_of(plan))
-    observe(plan.tables, state, row)
-    return row
-
-
-def taken_apart(plan: Plan, rows: Array) -> Results:
-    """Rows as the kernels wrote them, shape (.., width_of(plan)), by name."""
-    return results_of(rows, plan.joints, len(plan.pins))

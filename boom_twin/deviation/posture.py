@@ -30,7 +30,7 @@ from ..kernels.tables import BEAM, BODY, FRAME_ANGLE, FRAME_COS, FRAME_SIN, FRAM
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from ..kernels.transfer.time_step import ANEW, advance
+from ..kernels.transfer.time_step import advance
 from ..types import Array, StrokeReading
 from .channels import TIP_IMU_STATES, Measurement
 from .mode_tracking import iterate_modes, modal_loss, nudge_of, restore
@@ -158,7 +158,7 @@ def settle_at(t, boom, work, p, drives):
     for i in range(drives.shape[0]):
         p.drives[i], p.target[i] = drives[i], p.closed[i] + drives[i]
     scheme = prepare(REST, 0.0, 0.0, work.weights)
-    status, _, _ = advance(t, boom, work, scheme, p.target, p.rate, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
+    status, _, _ = advance(t, boom, work, scheme, p.target, p.rate, TOLERANCE, PASSES, LONGEST_INCREMENT, None, False)
     return status
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,6 @@ from ..analysis.undeflected import UndeflectedBoom
 from ..compiler.compile import compile_scene
 from ..config.settings import Settings
 from ..errors import SolverError, UsageError
-from ..kernels.jit import hold
 from ..kernels.result_row import places_in, prediction_width
 from ..kernels.tables import OK, SENTENCES, State, Tables, Work
 from ..predictions import Outline
@@ -141,11 +139,6 @@ class BoomPredictor:
         self._faults = NamedFaults(self.posture, reads)
         tables, boom = self.plan.tables, (self._anchor, self.live, self._work)
         self.compiled = CompiledBoom(tables, *boom, self.posture, self.filters, self._bending, self._row)
-
-    @cached_property
-    def held(self) -> tuple[Any, ...]:
-        """Fields of `compiled` as compiled code takes them with every call, see `boom_twin.kernels.jit.hold`."""
-        return tuple(map(hold, self.compiled))
 
     @property
     def stations(self) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 from ..analysis.drive import spring_free
 from ..analysis.equilibrium import settle
 from ..compiler.compile import compile_scene
-from ..compiler.plan import Plan, first_row, taken_apart
+from ..compiler.plan import Plan
 from ..errors import UsageError
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, State
 from ..scene.edit import with_rigid_cylinders
@@ -67,7 +67,7 @@ class RestFinder:
             if self._reads is StrokeReading.DRIVE:
                 return Rest(lengths, angles, readings)
             settle(self._struts, held, self._struts.work(), lengths, angles)
-        forces = taken_apart(self._struts, first_row(self._struts, held)).cylinder_forces
+        forces = self._struts.observed(held).cylinder_forces
         return Rest(spring_free(self._plan, lengths, forces), angles, readings)
 
     def tip_at(self, readings: Array) -> Array:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..kernels.elements.linkage import angle_of_length
 from ..kernels.integrators import X
 from ..kernels.jit import inner, kernel
@@ -33,7 +31,6 @@ from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, STARTED, drive_place, 
 
 PATIENCE = 1_000_000_000  # ns without readings after which the estimate is the prediction again
 STARTING = 1_000_000_000  # ns after the start; a valve that is found open by then was open at the start
-FOLLOW = np.bool_(True)  # of `linearise`, see `boom_twin.kernels.transfer.time_step.ANEW`
 ANGLE_STEP = 0.01  # rad that a joint turns by before the boom is linearised anew
 
 
@@ -67,7 +64,7 @@ def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
     for i in range(n):
         turned = max(turned, abs((f.mean[PREDICTION, drive + i] - p.drives[i]) * p.slope[i]))
     if turned > ANGLE_STEP:
-        status = linearise(t, boom, work, p, f.mean[PREDICTION, drive : drive + n], FOLLOW)
+        status = linearise(t, boom, work, p, f.mean[PREDICTION, drive : drive + n], True)
         if status != OK:
             return status
     if h == 0.0:

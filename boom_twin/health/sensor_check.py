@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.jit import SameTypes, hold
 from ..scene.schema import Scene
 from ..types import GIVE, Array, Mount, Stream, channels_of
 from .blocks import MeasuredRows
@@ -108,8 +107,6 @@ class SensorCheck:
             means=unknown.copy(),
             slow=self.slow,
         )
-        self._held = hold(self._known)
-        self._survey, self._find, self._summarise = SameTypes(survey), SameTypes(find), SameTypes(summarise)
         self._newest = np.zeros(BEFORE), *np.full((2, BEFORE, count), np.nan)  # stamps (s), readings, residuals
         self._calm = SensorFindings({}, np.zeros(count), np.full(count, np.nan))
         self._nothing = StreamReadings(MeasuredRows(np.empty(0, np.int64), *np.empty((3, 0, count))), unknown, self.slow, False)
@@ -128,7 +125,7 @@ class SensorCheck:
         if rows is None or not len(rows.stamps):
             return self._nothing
         columns = map(np.ascontiguousarray, rows)
-        is_bent = self._summarise(self._held, *columns, masked, min(1.0, span / WINDOW))
+        is_bent = summarise(self._known, *columns, masked, min(1.0, span / WINDOW))
         return StreamReadings(rows, self._known.means.copy(), self.slow, bool(is_bent))
 
     def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
@@ -142,12 +139,12 @@ class SensorCheck:
         pairs = zip(self._newest, (stamps, raw, raw - expected), strict=True)
         times, raw, left = rows = tuple(np.ascontiguousarray(np.concatenate(pair)) for pair in pairs)
         self._newest = tuple(each[-BEFORE:] for each in rows)
-        known, largest = self._known, self._survey(self._held, *rows)
+        known, largest = self._known, survey(self._known, *rows)
         interval = (times[-1] - times[BEFORE - 1]) / len(stamps)
         is_motion = self._fastest > 0.0 and JERK * interval**3 > NOISY * self._sigma  # what bends readings so much
         is_known = bool(now - known.lately["first"][0] > NOISY_WINDOW and not is_motion)  # how noisy the sensors are
         flags, jumped = np.empty((5, len(known.power)), dtype=bool), np.empty(len(known.power))
-        if not self._find(self._held, *rows, largest, now, is_known, self._fastest, np.empty_like(times), flags, jumped):
+        if not find(self._known, *rows, largest, now, is_known, self._fastest, np.empty_like(times), flags, jumped):
             return self._calm
         by_kind = {
             "stuck": flags[STUCK], "noise": flags[IS_NOISY], "spikes": flags[SPIKES], "jump": jumped != 0.0,

@@ -83,8 +83,8 @@ def all_caches() -> list[Path]:
 def claim(folder: Path) -> None:
     """Note in `folder` that this installation uses it, and remove caches that no installation uses.
 
-    Those are: the cache of an earlier state of this installation, unless another one uses it too; a cache whose installations
-    are gone, or are not known, if nothing was written there for `KEPT` s.
+    The cache of an earlier state of this installation is removed, unless another one uses it too. A cache whose installations
+    are gone or unknown is removed if nothing was written there for `KEPT` s.
     """
     settings = _settings()
     name = hashlib.sha256(repr((str(ROOT), settings)).encode()).hexdigest()[:16] + USER
@@ -145,11 +145,11 @@ def _is_own_group(number: int) -> bool:
 class KernelCache:
     """The compiled code of one kernel on disk; has what numba's dispatcher asks of a cache.
 
-    It loads without first filling numba's tables of types and of BLAS, which takes 0.25 s: only compiling needs them, which
-    fills them itself. The intermediate code, which is four fifths of a load, is not kept: whoever calls a loaded kernel finds
-    its machine code. Kernels that this one calls are loaded before it.
+    A load does not fill numba's tables of types and of BLAS, which takes 0.25 s. Compiling needs them, and fills them itself.
+    The intermediate code is not kept: it would be four fifths of a load, and a call needs the machine code only. Kernels that
+    this one calls are loaded before it.
 
-    ImportError or AttributeError if numba does not have its parts where they were in the versions that are tested.
+    ImportError or AttributeError if numba does not have its parts where the tested versions have them.
     """
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:

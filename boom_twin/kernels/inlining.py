@@ -31,7 +31,7 @@ class Callee(NamedTuple):
 
 
 class CalledKernel(Dispatcher):
-    """Type of a kernel that is called: a number in the source is no type of its own, for which it were compiled once more."""
+    """Type of a kernel that is called. A literal number has its plain type, so that none compiles the kernel once more."""
 
     def get_call_type(self, context: Any, arguments: Any, named: Any) -> Any:
         """Return the signature for the arguments' types, after compiling for it if need be."""
@@ -42,9 +42,9 @@ register_model(CalledKernel)(models.OpaqueModel)
 
 
 class KernelCode(JITCodeLibrary):
-    """Code of a kernel with its `parts`, all that it calls but kernels.
+    """Code of a kernel: `parts` are the libraries copied into it, `calls` the kernels that it calls.
 
-    `calls` are the kernels that it calls, whose machine code must be there before.
+    The machine code of `calls` must be there before this code is loaded.
     """
 
     def __init__(self, codegen: Any, name: str) -> None:

@@ -1,8 +1,8 @@
-"""Named tuples that kernels take by reference: one pointer to a table of their fields.
+"""numba's type of the named tuples that kernels take by reference: one pointer to a table of their fields.
 
 numba hands a named tuple on by value: with a boom's tables, state and work arrays every call of a kernel passed some thousand
-numbers, and every function was compiled with them, which was most of the time of compiling. Here the fields are written once
-by Python, see `boom_twin.kernels.jit.hold`; kernels pass their address on and read a field where it is used.
+numbers, and every function was compiled with them, which was most of the time of compiling. Here Python writes the fields
+once, see `boom_twin.kernels.jit.Referenced`. Kernels pass the address on and read a field where it is used.
 
 A field is never written by a kernel (a named tuple cannot be changed, only what its arrays hold), so loads of fields are
 marked as invariant, and the compiler may move them out of loops.
@@ -14,35 +14,26 @@ import hashlib
 from typing import Any
 
 from numba import __version__ as numba_version
-from numba.core.typing.templates import AttributeTemplate  # what the public `infer_getattr` wants
-from numba.extending import (
-    NativeValue,
-    infer_getattr,
-    lower_getattr_generic,
-    models,
-    register_model,
-    typeof_impl,
-    unbox,
-)
-from numba.types import Array, BaseTuple, NamedTuple, Type, intp
+from numba.extending import NativeValue, lower_getattr_generic, models, register_model, typeof_impl, unbox
+from numba.types import Array, BaseTuple, NamedTuple, intp
 
-from .jit import ARRAY, HeldFields, _kind
+from .jit import ARRAY, Referenced
 
 
-class Reference(Type):
-    """numba's type of a named tuple by reference; `fields` is its type by value, `places` where each begins in the table."""
+class Reference(NamedTuple):
+    """Type of a named tuple by reference. Its fields have the types of one by value; `places` is where each begins."""
 
-    def __init__(self, fields: Any) -> None:
-        self.fields = fields
-        words = [_words(kind) for kind in fields.types]
+    def __init__(self, types: list[Any], kind: type) -> None:
+        super().__init__(types, kind)
+        words = [_words(each) for each in types]
         self.places = [sum(words[:i]) for i in range(len(words))]
-        digest = hashlib.sha256(str(fields).encode()).hexdigest()[:16]
-        super().__init__(f"{fields.instance_class.__name__}_{digest}")
+        digest = hashlib.sha256(str(types).encode()).hexdigest()[:16]
+        self.name = f"{kind.__name__}_{digest}"  # a part of the name of machine code
 
 
 def _words(kind: Any) -> int:
-    """Return how many words of the table a value takes."""
-    if isinstance(kind, BaseTuple):
+    """Return the words of the table that a value takes."""
+    if isinstance(kind, BaseTuple) and not isinstance(kind, Reference):
         return sum(map(_words, kind))
     return len(ARRAY) - 2 + 2 * kind.ndim if isinstance(kind, Array) else 1
 
@@ -52,28 +43,17 @@ class ReferenceModel(models.PrimitiveModel):
     """An address of words."""
 
     def __init__(self, manager: Any, of: Reference) -> None:
-        for each in (manager.lookup(kind) for kind in of.fields.types if isinstance(kind, Array)):
+        for each in (manager.lookup(kind) for kind in of.types if isinstance(kind, Array)):
             if [each.get_field_position(name) for name in ARRAY] != list(range(len(ARRAY))):
                 raise ImportError(f"numba {numba_version} keeps arrays otherwise than the versions that were tested")
         super().__init__(manager, of, manager.lookup(intp).get_value_type().as_pointer())
 
 
-@infer_getattr
-class ReferenceAttribute(AttributeTemplate):
-    """Types of fields."""
-
-    key = Reference
-
-    def generic_resolve(self, of: Reference, name: str) -> Any:
-        """Type of the field `name`; None if there is none."""
-        return of.fields[of.fields.fields.index(name)] if name in of.fields.fields else None
-
-
 @lower_getattr_generic(Reference)
 def field_of(context: Any, builder: Any, of: Reference, address: Any, name: str) -> Any:
     """Load a field."""
-    i = of.fields.fields.index(name)
-    return _load(context, builder, of.fields.types[i], address, of.places[i])
+    i = of.fields.index(name)
+    return _load(context, builder, of.types[i], address, of.places[i])
 
 
 def _load(context: Any, builder: Any, kind: Any, address: Any, place: int) -> Any:
@@ -95,7 +75,7 @@ def _load(context: Any, builder: Any, kind: Any, address: Any, place: int) -> An
                 loaded = word(len(numbers) + part * kind.ndim + axis, each.element)
                 value = builder.insert_value(value, loaded, [len(numbers) + part, axis])
         return value
-    if isinstance(kind, BaseTuple):
+    if isinstance(kind, BaseTuple) and not isinstance(kind, Reference):
         value = context.get_constant_null(kind)
         for i, part in enumerate(kind):
             value = builder.insert_value(value, _load(context, builder, part, address, place), i)
@@ -106,26 +86,21 @@ def _load(context: Any, builder: Any, kind: Any, address: Any, place: int) -> An
 
 @unbox(Reference)
 def unbox_reference(of: Reference, value: Any, c: Any) -> NativeValue:
-    """Take the address of fields that were written before."""
-    address = c.builder.bitcast(c.pyapi.long_as_voidptr(value), c.context.get_value_type(of))
-    error = c.pyapi.err_occurred()
-    return NativeValue(address, is_error=c.builder.icmp_unsigned("!=", error, error.type(None)))
+    """Take the address of the table."""
+    number = c.pyapi.object_getattr_string(value, "address")
+    is_missing = c.builder.icmp_unsigned("==", number, number.type(None))
+    number = c.builder.select(is_missing, c.pyapi.make_none(), number)  # no address can be read of null
+    address = c.builder.bitcast(c.pyapi.long_as_voidptr(number), c.context.get_value_type(of))
+    c.pyapi.decref(number)
+    return NativeValue(address, is_error=is_missing)
 
 
-def register(kind: type) -> None:
-    """Let kernels take named tuples of this class by reference."""
-    types = dict[Any, Reference]()
-
-    @typeof_impl.register(kind)
-    def type_of(value: Any, c: Any) -> Reference:
-        if (known := _kind(value)) not in types:
-            types[known] = Reference(NamedTuple([typeof_impl(field, c) for field in value], kind))
-        return types[known]
+_TYPES = dict[object, Reference]()  # by `Referenced.layout`
 
 
-@typeof_impl.register(HeldFields)
-def type_of_held(value: HeldFields, c: Any) -> Any:
-    """Return the type of the named tuple itself."""
-    if value.type is None:
-        value.type = typeof_impl(value.fields, c)
-    return value.type
+@typeof_impl.register(Referenced)
+def type_of(value: Any, c: Any) -> Reference:
+    """Return the type of a named tuple by reference."""
+    if (found := _TYPES.get(value.layout)) is None:
+        found = _TYPES[value.layout] = Reference([typeof_impl(field, c) for field in value], type(value))
+    return found

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..deviation.estimate_row import FORCE_VARIANCE, MODES
-from ..kernels.jit import SameTypes
 from ..kernels.tip_joints import write_derived
 from ..predictions import Estimate, Prediction
 from ..twin.blocks import EstimateBlock, Integers, PredictionBlock, row_of
@@ -125,9 +124,6 @@ class Chain(NamedTuple):
     lengths: Array
 
 
-_DERIVE = SameTypes(write_derived)
-
-
 def number_rows(chain: Chain, p: Prediction | PredictionBlock | None, e: Estimate | EstimateBlock | None, count: int) -> Array:
     """Return the numbers of `count` predictions and their estimates, shape (count, all); NaN if missing."""
     joints = len(chain.lengths)
@@ -142,7 +138,7 @@ def number_rows(chain: Chain, p: Prediction | PredictionBlock | None, e: Estimat
     if e is not None:
         rows = e.rows if isinstance(e, EstimateBlock) else row_of(e)[np.newaxis]
         numbers[:, at + 3 : -2] = rows[:, :FORCE_VARIANCE]
-    _DERIVE(chain.pivot, chain.lengths, numbers, JOINTS, at)
+    write_derived(chain.pivot, chain.lengths, numbers, JOINTS, at)
     derived = numbers[:, at : at + 3]
     derived[np.isnan(derived)] = math.nan  # the processor decides which of two NaN a sum has
     return numbers

@@ -121,7 +121,7 @@ class FatigueCounter:
         if not (np.isfinite(category) and category > 0.0):
             raise UsageError(f"--fatigue {category:g}: a detail category is above 0, in MPa. Take {CATEGORY:g}.")
         self.category, self._stations = category, stations(scene)
-        self._moduli = section_moduli(scene)[[station.section for station in self._stations]]
+        self._moduli = section_moduli(scene, self._stations)
         self._counters = [RainflowCounter() for _ in self._stations]
 
     def add(self, history: History) -> None:

@@ -15,7 +15,6 @@ import numpy as np
 
 from ..errors import UsageError
 from ..kernels.elements.linkage import DIRECT, LINK_L, LINK_R, LINKAGE, angles_of_lengths, cylinder_length, link_angles
-from ..kernels.jit import SameTypes
 from ..kernels.plane_algebra import turned
 from ..types import Array
 from .schema import Base, JointGeometry, Scene, Section
@@ -142,7 +141,6 @@ class RigidJoints:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._rows = scene, np.zeros(len(scene.joints), LINKAGE).view(np.recarray)
-        self._find = SameTypes(angles_of_lengths)
         for i in range(len(self._rows)):
             self._rows[i] = linkage(scene, i)
         ranges = np.radians([joint.range_deg for joint in scene.joints])
@@ -153,7 +151,7 @@ class RigidJoints:
         """See `joint_angles_of_strokes`."""
         rows, start_samples = self._rows, 181  # angles at which that of a stroke is looked for first
         angles, near = np.empty(len(rows)), np.full(len(rows), math.nan) if near is None else np.ascontiguousarray(near, float)
-        self._find(rows, self._closed + strokes, near, self._low, self._high, start_samples, angles)
+        angles_of_lengths(rows, self._closed + strokes, near, self._low, self._high, start_samples, angles)
         for i in np.flatnonzero(~np.isfinite(angles)).tolist():
             curve = stroke_curve(self._scene, i, np.linspace(self._low[i], self._high[i], start_samples))
             raise UsageError(

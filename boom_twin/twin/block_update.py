@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any
 
 import numpy as np
 
 from ..deviation.predictor import BoomPredictor, Drawn
 from ..health.blocks import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
-from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..predictions import Outline
 from ..types import Health, Report, Residuals, Stream
@@ -32,9 +30,6 @@ from .blocks import (
 from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, ROOM, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .update import DONE, LOOK, update
-
-_Code = Callable[..., tuple[int, int]]  # `update`, compiled for a scene's types
-_Held = tuple[_Code, tuple[Any, ...], Any]  # with boom, limits and state, and output, see `boom_twin.kernels.jit.hold`
 
 
 class BlockUpdate:
@@ -69,16 +64,6 @@ class BlockUpdate:
         self._due: Run | None = None  # run whose newest slot is still to be judged
         self._begins_health = False  # the health monitor restarts before the next rows are passed to it
         self._nothing = None if is_reporting else self.no_rows(0, REGULAR)
-        self._held: _Held | None  # compiled code and arguments of every call
-
-    @property
-    def limits(self) -> Limits:
-        """Limits that the compiled update checks samples against."""
-        return self._limits
-
-    @limits.setter
-    def limits(self, limits: Limits) -> None:
-        self._limits, self._held = limits, None
 
     def begin_health(self) -> None:
         """Restart the health monitor with the next rows; present rows are not passed to it."""
@@ -93,9 +78,9 @@ class BlockUpdate:
         self.judge()
         self.make_room()
         row, size = 0, len(block.stamps)
-        advance, arguments, found = self._held or self._hold()
+        given = *self._boom.compiled, self.limits, self._state
         while True:
-            reason, row = advance(*arguments, *block, row, trusted, found)
+            reason, row = update(*given, *block, row, trusted, self._found)
             if reason != LOOK:
                 break
             self._note_slot(run, row)
@@ -111,15 +96,6 @@ class BlockUpdate:
         if unmatched := int(self._state.clock[UNMATCHED]):
             self._event_counts["unmatched"] += unmatched
             self._state.clock[UNMATCHED] = 0
-
-    def _hold(self) -> _Held:
-        """Look up the compiled code and prepare the arguments of every call."""
-        state, found = hold(self._state), hold(self._found)
-        limits, (one, width) = hold(self._limits), (np.zeros(1, np.int64), int(self._limits.channels.max()))
-        arguments = *self._boom.held, limits, state
-        code = update.for_types_of(*arguments, one, one, np.zeros((1, width)), 0, False, found)
-        self._held = code, arguments, found
-        return self._held
 
     def make_room(self) -> None:
         """Prepare the next call of the compiled update; pass pending rows to the health monitor when the buffer is full."""

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..analysis.equilibrium import settle
 from ..compiler.compile import compile_scene
-from ..compiler.plan import first_row, taken_apart
 from ..config.settings import Settings
 from ..deviation.channels import READS_ACCELERATION, measurement_of
 from ..deviation.posture import locate
@@ -232,7 +231,7 @@ class RestModel:
             settle(self._plan, self._state, self._work, strokes, near)
         except BoomTwinError:
             return np.full(4 * len(strokes) + len(self._imus), np.nan)
-        found, frames = taken_apart(self._plan, first_row(self._plan, self._state)), self._state.frames
+        found, frames = self._plan.observed(self._state), self._state.frames
         mounted = [frames[places, 2] + self.scene.base.inclination for places in self._frames.values()]
         imus = [locate(self._plan.tables, self._state, self._measured, site)[2] for site in self._imus.values()]
         return np.concatenate([found.joints, *mounted, found.cylinder_forces, imus])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from compiled import first_row, rest_at, taken_apart
+from compiled import rest_at
 from default_boom import posture_angles, strokes_of_posture
 
 
@@ -28,7 +28,7 @@ def at_rest(scene, posture):
 def resting(scene, posture):
     """`Resting` of a scene in a posture."""
     plan, state, _ = at_rest(scene, posture)
-    found = taken_apart(plan, first_row(plan, state))
+    found = plan.observed(state)
     offsets = found.pins[:, 0] + 1j * found.pins[:, 1]
     sizes = found.pins[:, 2]
     return Resting(complex(*found.tip[0, :2]), found.joints, found.cylinder_forces, offsets, sizes * offsets / np.abs(offsets))

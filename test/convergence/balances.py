@@ -45,7 +45,7 @@ from boom_twin.kernels.tables import OK, SENTENCES, Motion, State, Work
 from boom_twin.kernels.transfer.clearance_pins import axis_of, load_pins, torque_of
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.riccati_sweep import FREE, clear_cut, sweep_in
-from boom_twin.kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
+from boom_twin.kernels.transfer.time_step import LONGEST_INCREMENT, advance
 from boom_twin.types import Array
 
 FINER = 32  # sub-steps of a step where journals touch and part: as many as a step is divided into at most
@@ -207,7 +207,17 @@ def states_of(course: DriveCourse, dt: float) -> Iterator[tuple[float, State]]:
             if len(loads):
                 work.load[:] = work.load[1], loads[row]
             status, _, _ = advance(
-                plan.tables, state, work, scheme, drives[row], rates[row], STEP_TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW
+                plan.tables,
+                state,
+                work,
+                scheme,
+                drives[row],
+                rates[row],
+                STEP_TOLERANCE,
+                PASSES,
+                LONGEST_INCREMENT,
+                None,
+                False,
             )
             assert status == OK, SENTENCES[status]
             row += 1

@@ -78,7 +78,7 @@ def test_modes_followed_over_a_move_are_those_found_anew(boom: BoomPredictor, sc
     p, m = boom.posture, int(boom.posture.modes[0])
     end = DRIVES + np.array([0.02, -0.01, 0.015, 0.02])
     for share in np.linspace(0.125, 1.0, 8):  # steps of 0.01 rad at most, as a twin takes them
-        assert linearise(*boom.held[:2], *boom.held[3:5], DRIVES + share * (end - DRIVES), True) == 0
+        assert linearise(*boom.compiled[:2], *boom.compiled[3:5], DRIVES + share * (end - DRIVES), True) == 0
     plan, state, work = rest_at(scene, end, joint_angles_of_strokes(scene, end))
     anew = natural_modes(plan, state, work, m, 1e-9)
     assert p.omega[:m] / (2.0 * np.pi) == pytest.approx([mode.frequency for mode in anew], rel=2e-5)

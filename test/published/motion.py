@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import compiled
 import numpy as np
-from compiled import RHO, Plan, compile_scene, set_undeformed, taken_apart
+from compiled import RHO, Plan, compile_scene, set_undeformed
 
 from boom_twin.analysis.drive import PASSES
 from boom_twin.kernels.integrators import DEPTH, GENERALISED_ALPHA, HAT, NEW_A, A, P, Scheme, X, new_weights
@@ -64,7 +64,7 @@ def stepped(start, step, count, every, drive=None, rho=RHO):
         rates = np.zeros_like(lengths)
     else:
         lengths, rates = drive(step * np.arange(1, count + 1))
-    return taken_apart(plan, compiled.stepped(plan, state, work, step, every, lengths, rates, rho, TOLERANCE)).tip
+    return plan.results(compiled.stepped(plan, state, work, step, every, lengths, rates, rho, TOLERANCE)).tip
 
 
 def halved(start, step, duration, rows, drive=None, halvings=3, rho=RHO):

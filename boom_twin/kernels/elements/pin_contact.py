@@ -37,8 +37,7 @@ LEAST_SHARE = 0.01  # least contact force as a fraction of the elastic force
 SLOWEST = 1e-3  # m/s, least speed of approach
 SLIP = 1e-3  # m/s, slip at which friction has 0.7 of its full size
 
-# Kinds of pins. They are typed because numba compiles again for every literal.
-PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD_END_PIN, BARREL_END_PIN = map(np.int64, range(6))
+PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD_END_PIN, BARREL_END_PIN = range(6)  # kinds of pins
 
 
 class Journal(NamedTuple):

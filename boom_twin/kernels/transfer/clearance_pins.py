@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..elements.cylinder import AXIAL, END_C, END_R
 from ..elements.pin_contact import (
     BARREL_END_PIN,
@@ -275,7 +273,6 @@ def unstiffened(t, work, k, ax, ay):
 HEAD, PIN_C, SECTION = 2, 3, 5  # from SECTION on in the order of the joint's unknowns
 ALPHA_L, ALPHA_R, LAMBDA = SECTION + Z_LINK_L, SECTION + Z_LINK_R, SECTION + Z_LAMBDA
 FORCE, SIZE = SECTION + Z_FORCE_B, SECTION + Z_OFFSETS_B
-INNER = np.int64(Z_OFFSETS_B)  # typed, because numba compiles once more for every literal
 
 
 @inner

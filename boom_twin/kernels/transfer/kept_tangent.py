@@ -1,27 +1,24 @@
 """Tangents that are kept from step to step: modified Newton with a monitor of its convergence.
 
-A pass with the tangent of an earlier place leaves a share of the error that it finds, about as large as the boom has turned
-and bent since (Deuflhard, Newton Methods for Nonlinear Problems, 2011, section 2.1). So the error after a pass is
+A pass with an old tangent leaves a fraction of the error, which grows with how far the boom has moved since (Deuflhard, Newton
+Methods for Nonlinear Problems, 2011, section 2.1). The error after a pass is taken as
 
-    share times size,    share = lead times travel,
+    lead * travel * size.
 
-size being the pass's largest increment, travel the largest change of a coordinate since the tangent was made, both as angles,
-and `lead` a number that is raised whenever two passes of a step show more. Passes follow until that is below a tenth of the
-square of the tolerance, which is what a pass with a new tangent would leave, or below a share of what the step itself is off
-by: solving the equations of a long step more exactly makes nothing better. At the usual tolerance of 1e-6 rad that share is a
-thousandth from 14 ms on, and 5e-6 at 1 ms, where no number moves by more than 1e-9 of its range. After a step with more than
-one pass the next begins with a new tangent, and so does a pass where the share would be above 0.15.
+`size` is the largest increment of the pass. `travel` is the largest change of a coordinate since the tangent was made, plus an
+equivalent of the change of the gain, so that steps of nearly equal length share a tangent. Both are angles. `lead` rises
+whenever two passes of a step converge more slowly than it says.
 
-Steps of nearly the same length share a tangent, too, so that stamps need not be even: what another gain leaves counts as so
-much more travel.
+A step ends when that error is below the larger of two bounds. The first is a tenth of the square of the tolerance, which a pass
+with a new tangent would leave. The second is a fraction of the step's own error, because more exact equations make a long step
+no better. At the usual tolerance of 1e-6 rad the fraction is 1e-3 from steps of 14 ms on, and 5e-6 at 1 ms. There no number
+moves by more than 1e-9 of its range. The step's own error is (a' - a)/gain: a second-order scheme assumes that the acceleration
+changes little within a step (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 1993, section II.4).
 
-A second-order step takes the acceleration as changing little within it; what its change a' - a moves in the step, (a' - a)/gain
-with 1/gain about a quarter of the step's square, is of the size of the step's own error (Hairer, Norsett and Wanner, Solving
-Ordinary Differential Equations I, 1993, section II.4).
+A new tangent is made after a step with more than one pass, and where `lead * travel` would exceed 0.15.
 
-That one pass nearly always suffices is because a step's guess is corrected as the last ones had to be, by the parabola through
-the corrections of three steps. Without it an error of one sign was left in every step, 1e-12 rad of which the tip collects to
-0.1 um.
+One pass nearly always suffices, because the first guess of a step is corrected by the parabola through the last three
+corrections. Without it every step left an error of one sign, 1e-12 rad, which added up to 0.1 um at the tip.
 """
 
 from __future__ import annotations
@@ -30,16 +27,16 @@ from ..integrators import A
 from ..jit import inner
 from ..tables import CORRECTIONS
 
-LEAD = 4.0  # at first
-LONG_GAIN = 2e4  # 1/s^2, of a long step: one of 14 ms. Of shorter ones less may be left, by the square of the step
+LEAD = 4.0  # first value of `lead`
+LONG_GAIN = 2e4  # 1/s^2, gain of a step of 14 ms; shorter steps may leave less, by the square of the step
 
-# Of `Work.kept`: gain that the tangent is for, or 0; lead; how many corrections are known; travel after the newest pass.
+# Places in `Work.kept`: gain of the tangent, or 0; lead; number of known corrections; travel after the newest pass.
 GAIN, SHARE_LEAD, CORRECTED, TRAVEL = range(4)
 
 
 @inner
 def forget_all(work):
-    """Forget tangent and corrections, for another boom or another motion begins."""
+    """Forget tangent and corrections, because another boom or another motion begins."""
     work.kept[GAIN], work.kept[SHARE_LEAD], work.kept[CORRECTED] = 0.0, LEAD, 0.0
 
 
@@ -52,19 +49,19 @@ def forget_tangent(work):
 @inner
 def may_keep(work, gain):
     """Return True if the kept tangent is good enough for a step of a scheme with `gain`."""
-    near = work.kept[SHARE_LEAD] * (work.kept[TRAVEL] + detuning(work, gain)) < 0.15  # of an error that a pass may leave
+    near = work.kept[SHARE_LEAD] * (work.kept[TRAVEL] + detuning(work, gain)) < 0.15  # fraction of an error left by a pass
     return near & (work.kept[GAIN] != 0.0)
 
 
 @inner
 def detuning(work, gain):
-    """Return how far the gain of the kept tangent is off `gain`, as the travel (rad) that at first counts as much."""
+    """Return the relative difference of the kept tangent's gain from `gain`, as travel (rad)."""
     return abs(work.kept[GAIN] - gain) / gain / LEAD
 
 
 @inner
 def keep_tangent(state, work, gain):
-    """Note that tangents are made here, for `gain`."""
+    """Store where, and for which gain, the new tangent is made."""
     work.kept[GAIN], work.kept[TRAVEL] = gain, 0.0
     for i in range(state.z.shape[0]):
         work.kept_z[i] = state.z[i]
@@ -72,7 +69,7 @@ def keep_tangent(state, work, gain):
 
 @inner
 def travel(t, state, work):
-    """Largest change of a coordinate since tangents were made, as an angle (rad)."""
+    """Return the largest change of a coordinate since the tangent was made, as an angle (rad)."""
     most = 0.0
     for i in range(state.z.shape[0]):
         most = max(most, t.scale[i] * abs(state.z[i] - work.kept_z[i]))
@@ -81,7 +78,7 @@ def travel(t, state, work):
 
 @inner
 def step_error(t, state, work, gain):
-    """About how far a step of a scheme with `gain` (1/s^2) is off by itself (rad), see above."""
+    """Return the estimated error (rad) of a step of a scheme with `gain` (1/s^2) itself."""
     most, a = 0.0, state.history[A]
     for i in range(state.z.shape[0]):
         most = max(most, t.scale[i] * abs(state.z[i] - work.hat[i] - a[i] / gain))
@@ -92,8 +89,8 @@ def step_error(t, state, work, gain):
 def is_converged(t, state, work, size, before, renewed, tolerance, gain):
     """Return True if a pass with an increment of `size` (rad) was the last of a step.
 
-    before : increment of the pass before it in this step, or 0. renewed : whether the tangent was new, so that what is left is
-    about the square of `size`. Below the tolerance an increment that does not get smaller is rounding. gain : of the scheme.
+    `before` is the increment of the pass before in this step, or 0. A new tangent (`renewed`) leaves about the square of
+    `size`. Below the tolerance, an increment that does not get smaller is rounding. `gain` is that of the scheme.
     """
     way = work.kept[TRAVEL] = travel(t, state, work)
     way += detuning(work, gain)
@@ -107,7 +104,7 @@ def is_converged(t, state, work, size, before, renewed, tolerance, gain):
 
 @inner
 def correct_guess(state, work):
-    """Correct the guess in `state` as the last ones had to be; before the first pass of a step."""
+    """Add the extrapolated correction to the guess in `state`, before the first pass of a step."""
     known, c = work.kept[CORRECTED], work.corrections
     for i in range(state.z.shape[0]):
         work.guess[i] = state.z[i]
@@ -121,7 +118,7 @@ def correct_guess(state, work):
 
 @inner
 def note_correction(state, work):
-    """Note by how much the guess was off, after the last pass of a step."""
+    """Store the correction of the guess, after the last pass of a step."""
     for i in range(state.z.shape[0]):
         work.corrections[2, i], work.corrections[1, i] = work.corrections[1, i], work.corrections[0, i]
         work.corrections[0, i] = state.z[i] - work.guess[i]

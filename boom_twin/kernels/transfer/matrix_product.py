@@ -22,8 +22,6 @@ from ..plane_algebra import solve
 from ..tables import DIGITS_LOST, JOINT_B, OK, ROD_PIN, SINGULAR, STATION, Z_FORCE_A, Tables
 from .riccati_sweep import clear_cut, sweep_in, sweep_out
 
-THREE, FIVE, SIX, SEVEN = np.int64(3), np.int64(5), np.int64(6), np.int64(7)
-
 
 class Product(NamedTuple):
     """Working arrays of the plain product for a boom of k units."""
@@ -57,7 +55,7 @@ def new_product(t: Tables) -> Product:
 @inner
 def open_end(work, force):
     """Begin at the output cut of a unit, with force `force` (3,) and df as three more degrees of freedom."""
-    clear_cut(work, SIX)
+    clear_cut(work, 6)
     for i in range(3):
         work.p[i] = force[i]
         work.s[i, 3 + i] = 1.0
@@ -73,7 +71,7 @@ def transfer_matrix(s, p, force, a, right, order, u):
             right[i, j] = -s[i, j]
             right[i, 3 + j] = 1.0 if i == j else 0.0
         right[i, 6] = -p[i]
-    if not solve(a, right, THREE, SEVEN, order):
+    if not solve(a, right, 3, 7, order):
         return False
     for i in range(3):
         for j in range(7):
@@ -124,7 +122,7 @@ def close_root(work, product):
                 a[2 + i, 2 + j] += weight * s[3 + k, 3 + j]
         for j in range(3):
             a[2 + i, 2 + j] += total[3 + i, 3 + j]
-    return solve(a, right, FIVE, np.int64(1), product.order)
+    return solve(a, right, 5, 1, product.order)
 
 
 @inner
@@ -137,7 +135,7 @@ def plain_pass(t, state, work, motion, drive, drive_rate, product):
             total[i, j] = 1.0 if i == j else 0.0
     for k in range(units - 1, -1, -1):
         open_end(work, force[k])
-        status, _, _ = sweep_in(t, state, work, motion, drive, drive_rate, bounds[k], bounds[k + 1], SIX)
+        status, _, _ = sweep_in(t, state, work, motion, drive, drive_rate, bounds[k], bounds[k + 1], 6)
         if status != OK:
             return SINGULAR
         if k > 0:
@@ -162,7 +160,7 @@ def plain_pass(t, state, work, motion, drive, drive_rate, product):
         for j in range(3):
             z[i] += s[3 + i, 3 + j] * right[2 + j, 0]
         force[0, i] = z[3 + i]
-    sweep_out(t, state, work, bounds[0], bounds[1], SEVEN)
+    sweep_out(t, state, work, bounds[0], bounds[1], 7)
     return multiply_out(t, state, work, product)
 
 
@@ -184,6 +182,6 @@ def multiply_out(t, state, work, product):
             z[i] = new[i]
         for i in range(3):
             force[k, i] = z[3 + i]
-        sweep_out(t, state, work, bounds[k], bounds[k + 1], SIX)
+        sweep_out(t, state, work, bounds[k], bounds[k + 1], 6)
     left = max(abs(z[3]), abs(z[4]), abs(z[5]))
     return OK if left <= 1e-6 * largest else DIGITS_LOST  # nothing acts at the free tip

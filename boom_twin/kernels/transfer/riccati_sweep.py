@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..elements.beam import Sizes
 from ..elements.beam_equations import BeamEquations, transfer_beam
 from ..elements.pin_contact import BARREL_END_PIN
@@ -29,8 +27,7 @@ from .forward_kinematics import beam_part
 from .six_bar import close_loop, open_loop
 from .slider_crank import barrel_pin, close_base, join_rod
 
-# First operation; degrees of freedom (x, y, theta) of a cut without cylinders. Typed: numba compiles again for literals.
-ROOT, FREE = np.int64(0), np.int64(3)
+ROOT, FREE = 0, 3  # first operation; degrees of freedom (x, y, theta) of a cut without cylinders
 
 
 @inner

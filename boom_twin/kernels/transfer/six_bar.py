@@ -14,20 +14,17 @@ Pivots and link pins with clearance: `kernels.transfer.clearance_pins`.
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..elements.cylinder import AXIAL, END_C, END_R, cylinder_terms
 from ..elements.linkage import LINK_L
 from ..elements.pin_contact import LINK_L_PIN, PIVOT, Q_PIN, ROD_END_PIN
 from ..jit import inner
 from ..plane_algebra import factorise, rotated, substitute
-from ..tables import Z_FORCE_B, Z_LAMBDA, Z_LINK_L, Z_LINK_R, Z_SECTION
+from ..tables import Z_FORCE_B, Z_LAMBDA, Z_LINK_L, Z_LINK_R, Z_OFFSETS_B, Z_SECTION
 from .clearance_pins import (
     ALPHA_L,
     ALPHA_R,
     FORCE,
     HEAD,
-    INNER,
     LAMBDA,
     PIN_C,
     SECTION,
@@ -267,7 +264,7 @@ def _condense_loop_forces(work, operation, count, size):
             p[i] -= gains[k, i] * g[SECTION + k]
     for i in range(count):
         right[i, 0] = g[SECTION + i]
-    substitute(work.condensed.factors[operation], work.condensed.order[operation], right, count, np.int64(1))
+    substitute(work.condensed.factors[operation], work.condensed.order[operation], right, count, 1)
     for i in range(count):
         work.condensed.free[operation, i] = right[i, 0]
 
@@ -277,7 +274,7 @@ def open_loop(t, state, work, index, operation, m):
     """Increments of joint B `index` from the cut at its head (m slots), which becomes that of section i; returns its slots."""
     joint, cut, dz = t.joints[index], work.cut, work.dz
     gains, free = work.condensed.gains[operation], work.condensed.free[operation]
-    for i in range(INNER + 2 * joint.clearances):
+    for i in range(Z_OFFSETS_B + 2 * joint.clearances):
         value = -free[i]
         for j in range(m):
             value -= gains[i, j] * cut[j]
@@ -286,8 +283,8 @@ def open_loop(t, state, work, index, operation, m):
         _move_cylinder(t, state, work, index)
     for k in range(joint.clearances):
         if t.clearances[joint.first_clearance + k].place == PIVOT:
-            cut[0] += dz[joint.z + INNER + 2 * k]
-            cut[1] += dz[joint.z + INNER + 2 * k + 1]
+            cut[0] += dz[joint.z + Z_OFFSETS_B + 2 * k]
+            cut[1] += dz[joint.z + Z_OFFSETS_B + 2 * k + 1]
     cut[HEAD] = dz[joint.z + Z_SECTION]
     for i in range(SECTION, m):
         cut[i - 2] = cut[i]
@@ -305,7 +302,7 @@ def _move_cylinder(t, state, work, index):
     if linkage.mount != LINK_L:
         base, link = dz[joint.z + Z_SECTION], dz[joint.z + Z_LINK_R]
     for k in range(joint.clearances):
-        place, at = t.clearances[joint.first_clearance + k].place, joint.z + INNER + 2 * k
+        place, at = t.clearances[joint.first_clearance + k].place, joint.z + Z_OFFSETS_B + 2 * k
         if (place == LINK_L_PIN) == (linkage.mount == LINK_L) and place != Q_PIN:
             rx, ry = rx + dz[at], ry + dz[at + 1]
     rx, ry = rx - by * base - wy * link, ry + bx * base + wx * link

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..elements.pin_contact import CLOSED
 from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
 from ..jit import inner, kernel
@@ -25,9 +23,8 @@ from .kept_tangent import (
 from .matrix_product import plain_pass
 from .riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
-ANEW = np.bool_(False)  # `keep` of `advance`: no kept tangent. Typed, because numba compiles once more for every literal
-TICKS = np.int64(4096)  # ticks of a step; sub-steps are whole numbers of ticks
-MOST = np.int64(32)  # largest number of sub-steps for accuracy; after failed passes they are divided down to SHORTEST
+TICKS = 4096  # ticks of a step; sub-steps are whole numbers of ticks
+MOST = 32  # largest number of sub-steps for accuracy; after failed passes they are divided down to SHORTEST
 SHORTEST = 1e-5  # s, shortest sub-step
 LONGEST_INCREMENT = 0.5  # rad, limit of the increments in one pass of a time step; larger ones mean divergence
 

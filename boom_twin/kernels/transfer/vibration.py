@@ -27,8 +27,8 @@ from .forward_kinematics import place
 from .riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
 NOT_COUNTED = -1
-RENEW = np.bool_(True)  # typed, because numba compiles once more for every literal
-TIP_FORCE = np.int64(2)  # number of leading load entries for the tip force; the drives follow
+RENEW = np.bool_(True)  # typed: numba compiles once more for a named tuple that holds a literal
+TIP_FORCE = 2  # number of leading load entries for the tip force; the drives follow
 
 
 @kernel

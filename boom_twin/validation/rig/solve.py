@@ -22,10 +22,11 @@ from .stepping import Course, Effort, ParameterChanges, Scheme, step_through
 from .system import Boom, Site, Station
 
 
-def find_equilibrium(system: Any, aim: str) -> None:
-    """Bring an assembled system to rest under its full load; errors name the `aim`. What follows starts there."""
-    residual, moving = _residual_of(system)
-    data = system.systemData
+def settle(boom: Boom, strokes: Array) -> None:
+    """Assemble the boom and bring it to rest at `strokes` (m) under its full load. What follows starts there."""
+    boom.system.Assemble()
+    residual, moving = _residual_of(boom.system)
+    data = boom.system.systemData
     state = np.concatenate([data.GetODE2Coordinates(), data.GetAECoordinates()])
     for _ in range(40):
         increment = np.linalg.solve(_tangent(residual, state, moving), -residual(state))
@@ -37,7 +38,11 @@ def find_equilibrium(system: Any, aim: str) -> None:
             residual(state)
             data.SetODE2Coordinates(state[:moving], exudyn.ConfigurationType.Initial)
             return
-    raise SolverError(f"The rig did not find {aim}. Check masses and stiffnesses, or take strokes nearer to a posture.")
+    where = ", ".join(f"{stroke:.6g}" for stroke in strokes)
+    raise SolverError(
+        f"The rig did not find the equilibrium at strokes {where} m. Check masses and stiffnesses, or take strokes nearer to a "
+        "posture."
+    )
 
 
 def _residual_of(system: Any) -> tuple[Any, int]:
@@ -257,13 +262,6 @@ def move(
     found["forces"][0] = resting.rows["forces"][0]  # Exudyn starts with zero multipliers: incompressible cylinders read zero
     found["t"] = _recorded_times(found["t"], times[::every])
     return found | {"drives": drive(found["t"])[0]}, effort
-
-
-def settle(boom: Boom, strokes: Array) -> None:
-    """Assemble the boom and bring it to its equilibrium; it is the start of what follows."""
-    boom.system.Assemble()
-    aim = f"the equilibrium at strokes {', '.join(f'{s:.6g}' for s in strokes)} m"
-    find_equilibrium(boom.system, aim)
 
 
 def _ratio(name: str, whole: float, step: float) -> int:

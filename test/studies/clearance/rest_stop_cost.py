@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from compiled import first_row, rest_at, taken_apart
+from compiled import rest_at
 from default_boom import motion_of, posture_angles, strokes_of_posture
 from studies.stops import StopMotion, halt
 
@@ -74,7 +74,7 @@ def _loaded(scene: Scene, posture: str, index: int) -> float:
 def _rest(scene: Scene, posture: str, more: float | np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Tip (2,) in m, pins (k, 4) as in `compiler.plan`."""
     plan, state, _ = rest_at(scene, strokes_of_posture(scene, posture) + more, posture_angles(scene, posture))
-    found = taken_apart(plan, first_row(plan, state))
+    found = plan.observed(state)
     return found.tip[0, :2], found.pins
 
 

@@ -17,7 +17,7 @@ from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.integrators import NEWMARK, A, P, X, prepare
 from boom_twin.kernels.tables import OK, SENTENCES, State
 from boom_twin.kernels.transfer.forward_kinematics import place
-from boom_twin.kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
+from boom_twin.kernels.transfer.time_step import LONGEST_INCREMENT, advance
 from boom_twin.types import Array
 
 SHORT = 2e-5  # s
@@ -38,7 +38,9 @@ def undeflected(scene: Scene, strokes: Array, angles: Array) -> State:
     for step in (SHORT, 0.5 * SHORT):
         trial, scheme = State(*(array.copy() for array in state)), prepare(NEWMARK, HALF, step, work.weights)
         still = np.zeros(plan.joints)
-        status, _, _ = advance(plan.tables, trial, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
+        status, _, _ = advance(
+            plan.tables, trial, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None, False
+        )
         if status != OK:
             raise SolverError(f"the boom cannot be let go: {SENTENCES[status]}.")
         ends.append((trial.history[A], trial.z))
