@@ -30,6 +30,11 @@ class Reference(NamedTuple):
         digest = hashlib.sha256(str(types).encode()).hexdigest()[:16]
         self.name = f"{kind.__name__}_{digest}"  # a part of the name of machine code
 
+    @property
+    def key(self) -> str:
+        """Name instead of all types of fields, by which numba would tell types apart in every look-up while it compiles."""
+        return self.name
+
 
 def _words(kind: Any) -> int:
     """Return the words of the table that a value takes."""
