@@ -191,7 +191,7 @@ def test_messages_are_read_by_the_mapping(tmp_path: Path) -> None:
         ("sensors: {moment_1: {place: {att: 1.0}}}", "nearest known key here is `at`"),
         ("inputs: {points: {name: other}}", "inputs.points.place"),
         ("inputs: {imu_2: {place: {section: 0}}}", "inputs.imu_2.place.section"),
-        ("inputs: {joint_angles: {place: {section: 1}}}", "only IMUs and points have a place"),
+        ("inputs: {joint_angles: {place: {section: 1}}}", "only IMUs and points have it"),
         ("inputs: {imu_5: {name: other}}", "nearest is `imu_"),
     ],
 )
