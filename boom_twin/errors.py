@@ -58,7 +58,7 @@ class Fault:
     bound: str  # what would be allowed
     remedy: str
     line: int | None = None  # line of the file, from 1
-    kind: FaultKind = "fault"  # ``warning`` if the scene can be used; ``note`` if it need not even be mended
+    kind: FaultKind = "fault"  # ``warning`` if the scene can be used; ``note`` if ``check --strict`` lets it pass, too
 
     def __str__(self) -> str:
         where = self.path if self.line is None else f"line {self.line}: {self.path}"

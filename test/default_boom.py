@@ -13,12 +13,12 @@ from boom_twin.scene.kinematics import (
     strokes_of_angles,
     strokes_of_posture,
 )
-from boom_twin.scene.load import clearance_text, default_text, examine, examine_text, example_names, example_text
+from boom_twin.scene.load import clearance_text, default_text, examine, examine_text, example_names, example_text, with_end_mark
 
 __all__ = [
     "EXACT", "anew", "clearance_text", "default_text", "examine", "examine_text", "example_names", "example_text",
     "joint_angles_of_strokes", "loaded", "motion_of", "parameter", "parameter_names", "posture_angles", "skeleton",
-    "stroke_curve", "strokes_of_angles", "strokes_of_posture", "with_parameters",
+    "stroke_curve", "strokes_of_angles", "strokes_of_posture", "with_end_mark", "with_parameters",
     "with_rigid_cylinders",
 ]  # fmt: skip
 

@@ -231,7 +231,7 @@ def scene_of(session: Path, given: SceneSource | SessionScene = None) -> Session
         return scene_from(None)
     recorded, digest = kept(session, "scene_sha256", "--scene"), sha256(own.text)
     try:
-        scene, oddities = examine_text(own.text, own.source)
+        scene, oddities = examine_text(own.text, own.source, whole=recorded is not None and recorded.text == digest)
     except SceneError as error:
         more = f" (and {len(error.faults) - 1} more)" if len(error.faults) > 1 else ""
         raise BagError(f"{own.source}: {error.faults[0]}{more} Give the scene by --scene.") from None

@@ -47,7 +47,7 @@ def run(args: Namespace) -> int:
     need.refuse_misuse(args)
     if args.picture is not None:
         check_target(args.picture, files_of(args, "scene"), PNG)
-    scene, warnings = examine(args.scene)
+    scene, oddities = examine(args.scene)
     sensors = None if args.sensors is None else sensors_of(args.sensors, scene)
     if args.drive == "angles" and any(stream is Stream.ANGLES for _, stream, _ in sensors or ()):
         raise UsageError("--sensors angles: angles drive the model. Name only the further sensors.")
@@ -57,12 +57,13 @@ def run(args: Namespace) -> int:
         from ..plots.boom import joint_ranges_picture
 
         drawn = [f"Written: {joint_ranges_picture(args.picture, scene, Path(name).name)}"]
+    warnings, notes = ([each for each in oddities if (each.kind == "note") is is_note] for is_note in (False, True))
     if args.strict and warnings:
         for line in drawn:  # the picture shows what the warnings are about
             tell(line)
         raise SceneError(name, tuple(warnings))
     account = explain(scene)
-    values, lines = summary(name, account, warnings), report(name, scene, account, warnings)
+    values, lines = summary(name, account, warnings, notes), report(name, scene, account, warnings, notes)
     if scene.clearance is not None:
         law = scene.clearance.contact
         values |= {"restitution": law.restitution, "restitution_given": law.given_restitution}
@@ -81,7 +82,7 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def summary(name: str, account: Account, warnings: Sequence[Fault]) -> dict[str, Any]:
+def summary(name: str, account: Account, warnings: Sequence[Fault], notes: Sequence[Fault]) -> dict[str, Any]:
     sections, joints, base = account.sections, account.joints, account.scene.base.stiffness
     return {
         "scene": name,
@@ -109,10 +110,11 @@ def summary(name: str, account: Account, warnings: Sequence[Fault]) -> dict[str,
         "oil_stiffness_N_m": [list(joint.k_over_stroke) for joint in joints],
         "left_out": [f"{key}: {meaning}" for key, meaning in account.left_out.items()],
         "warnings": [*map(str, warnings)],
+        "notes": [*map(str, notes)],
     }
 
 
-def report(name: str, scene: Scene, account: Account, warnings: Sequence[Fault]) -> list[str]:
+def report(name: str, scene: Scene, account: Account, warnings: Sequence[Fault], notes: Sequence[Fault]) -> list[str]:
     kinds = " + ".join(joint.kind for joint in scene.joints)
     count = len(account.sections)
     lines = [f"{name}: this scene can be used"]
@@ -133,7 +135,8 @@ def report(name: str, scene: Scene, account: Account, warnings: Sequence[Fault])
     left_out = _table([*map(list, account.left_out.items())], left=2)
     lines += ["", "Left out of the model (absent from the scene, zero or false)", *left_out]
     lines += ["", f"Unknowns per step: {account.unknowns}", *_unknowns(account)]
-    lines += ["", f"Warnings: {len(warnings) or 'none'}", *(f"  {warning}" for warning in warnings)]
+    lines += ["", *(f"Note: {note}" for note in notes)]
+    lines += [f"Warnings: {len(warnings) or 'none'}", *(f"  {warning}" for warning in warnings)]
     return lines
 
 

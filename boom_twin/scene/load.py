@@ -1,7 +1,8 @@
 """Load a scene file: `load_scene` reads its text, validates every value against the schema, and runs the cross-checks.
 
-Printed scenes end with the comment `MARK` and promise it in their head by the comment `PROMISE`. A file that promises the mark
-and lacks it was cut off, and is refused.
+A line ``# end of scene`` shows that a file was not cut off, and a line in its head (`PROMISE`) says that it has one. Both are
+comments, so that the file stays plain YAML. A file that promises the mark is refused without it; one that says nothing can be
+used, with a warning.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
@@ -129,14 +130,25 @@ def _plain(value: Any) -> Any:
     return _plain(value.tolist()) if hasattr(value, "tolist") else value
 
 
-def _cut_off(text: str) -> list[Fault]:
-    """Return the fault of a file that promises the end mark in its head and lacks it; else none."""
+def missing_end_mark(text: str) -> Fault | None:
+    """Return a fault if the end of a scene file is cut off, a warning or a note if it may be; None if it is whole.
+
+    Many files that were written by hand have no mark. That is a note, and a warning where not even the last line ends.
+    """
     lines = text.splitlines()
-    if PROMISE not in lines or MARK in lines:
-        return []
-    bound = f"the first lines say that the file ends with `{MARK}`, and it does not: it was cut off"
-    remedy = "Fetch the whole file; or, if nothing is missing, add that line."
-    return [Fault("end of the file", lines[-1].strip(), bound, remedy, len(lines))]
+    number = max((i for i, line in enumerate(lines, 1) if line.strip()), default=0)
+    last = lines[number - 1].strip() if number else ""
+    if last == MARK:
+        return None
+    if PROMISE in lines and MARK not in lines:
+        bound = f"the first lines say that the file ends with `{MARK}`, and it does not: it was cut off"
+        remedy = "Fetch the whole file; or, if nothing is missing, add that line."
+        return Fault("end of the file", last, bound, remedy, number)
+    kind: Literal["warning", "note"] = "note"
+    bound = f"no line `{MARK}`, so one cannot tell whether the rest of the file was cut off"
+    if not text.endswith("\n"):
+        bound, kind = f"no line `{MARK}`, and not even an end of line: it may have been cut off", "warning"
+    return Fault("end of the file", last, bound, "If nothing is missing, add that line at the end.", number, kind)
 
 
 # -- values and checks ---------------------------------------------------------------------------------------------------
@@ -240,13 +252,14 @@ def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:
     return examine_text(read_text(Path(source)), str(source))
 
 
-def examine_text(text: str, name: str) -> tuple[Scene, list[Fault]]:
-    """Load a scene from its text like `examine`. Errors call it by `name`."""
-    if cut_off := _cut_off(text):
-        raise SceneError(name, tuple(cut_off))
+def examine_text(text: str, name: str, whole: bool = False) -> tuple[Scene, list[Fault]]:
+    """Load a scene from its text like `examine`; `name`: its name in errors; `whole`: a checksum says it is not cut off."""
+    mark = None if whole else missing_end_mark(text)
+    if mark is not None and mark.kind == "fault":
+        raise SceneError(name, (mark,))
     document = parse(text, name)
     scene, findings = validated(document, Scene)
-    findings += document.faults
+    findings += [*document.faults, *filter(None, [mark])]
     if scene is not None:
         with np.errstate(all="ignore"):  # what overflows fits nowhere, and the checks say so
             findings += _checked(Draft(document, scene))

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from command import main
+from command import answer, main
 from default_boom import default_text
 
 
@@ -18,6 +18,23 @@ def _scene(folder: Path, old: str, new: str) -> str:
     path = folder / "scene.yaml"
     path.write_text(default_text().replace(old, new), encoding="utf-8")
     return str(path)
+
+
+@pytest.mark.parametrize(("end", "code"), [("\n", 0), ("", 1)], ids=["whole line", "cut line"])
+def test_a_scene_without_end_mark_is_noted_and_strict_lets_it_pass(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], end: str, code: int
+) -> None:
+    """As a scene that was written by hand; but not where even the end of the last line is missing."""
+    path = tmp_path / "scene.yaml"
+    kept = [line for line in default_text().splitlines() if "end of scene" not in line]
+    path.write_text("\n".join(kept).rstrip() + end, encoding="utf-8")
+    assert main(["check", str(path), "--strict"]) == code
+    out, err = capsys.readouterr()
+    assert ("Note: line" in out and "Warnings: none" in out) if code == 0 else "it may have been cut off" in err
+    values = answer(capsys, "check", str(path))
+    assert [len(values[key]) for key in ("notes", "warnings")] == [1 - code, code]
+    assert main(["statics", str(path), "--posture", "arch"]) == 0
+    assert capsys.readouterr().err.startswith(f"{'warning' if code else 'note'}: {path}: line ")
 
 
 def test_check_warns_in_words_and_in_one_flat_object(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

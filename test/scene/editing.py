@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from default_boom import default_text, examine, example_text
+from default_boom import default_text, examine, example_text, with_end_mark
 from ruamel.yaml import YAML
 
 from boom_twin import SceneError
@@ -48,7 +48,7 @@ class Bench:
         """Write a scene file of these values."""
         stream = io.StringIO()
         YAML(typ="safe", pure=True).dump(values, stream)
-        return self.text(stream.getvalue())
+        return self.text(with_end_mark(stream.getvalue()))
 
     def text(self, text: str) -> Path:
         """Write a scene file of this text."""

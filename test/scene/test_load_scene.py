@@ -12,7 +12,7 @@ from command import main
 from default_boom import clearance_text, default_text, examine
 from scene.editing import put
 
-from boom_twin import SceneError, load_scene
+from boom_twin import SceneError, SceneWarning, load_scene
 from boom_twin.config.yaml_text import plain
 
 
@@ -194,17 +194,19 @@ def test_no_cut_of_a_printed_scene_goes_by(
     assert silent_cuts(bench, text.decode(), range(len(text)) if every else sorted(places - {len(text)})) == []
 
 
-def test_a_scene_that_does_not_promise_the_mark_needs_none(bench: Any) -> None:
-    text = "\n".join(line for line in default_text().splitlines() if "end of scene" not in line)
-    assert examine(bench.text(text)) == (load_scene(), [])
+def test_cuts_of_a_scene_without_the_mark_are_told(bench: Any) -> None:
+    text = "\n".join(line for line in default_text().splitlines() if "end of scene" not in line) + "\n"
+    with pytest.warns(SceneWarning, match="end of the file"):
+        assert load_scene(bench.text(text)) == load_scene()
+    assert silent_cuts(bench, text, range(text.index("postures:"), len(text) - 1, 7)) == []
     text = default_text()
     (fault,) = bench.faults_of(bench.text(text[: text.index("  high:")]))
     assert fault.path == "end of the file" and "cut off" in fault.bound and "Fetch the whole file" in fault.remedy
 
 
-def test_a_block_behind_the_mark_is_read_and_blanks_do_not_matter(bench: Any) -> None:
+def test_a_block_behind_the_mark_is_read_and_told_and_blanks_do_not_matter(bench: Any) -> None:
     scene, oddities = examine(bench.text(default_text() + "\n" + clearance_text()))
-    assert scene.clearance is not None and oddities == []
+    assert scene.clearance is not None and [oddity.path for oddity in oddities] == ["end of the file"]
     bench.path.write_bytes((default_text() + "\n  \n").replace("\n", "\r\n").encode())
     with warnings.catch_warnings():
         warnings.simplefilter("error")

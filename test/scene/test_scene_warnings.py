@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from command import main
-from default_boom import clearance_text, default_text, example_names, example_text
+from default_boom import clearance_text, default_text, example_names, example_text, with_end_mark
 from scene.editing import OIL, put
 
 from boom_twin import SceneError, load_scene
@@ -169,7 +169,7 @@ def test_incompressible_cylinders_are_not_called_too_stiff(bench: Any) -> None:
 
 def test_sound_scenes_have_no_warning(bench: Any) -> None:
     whole = (Path(__file__).parents[2] / "examples" / "two_section_boom.yaml").read_text(encoding="utf-8")
-    clearance = f"{default_text()}\n{clearance_text()}"
-    loaded = f"{default_text()}\nline_fill: 20.0\ntip: {{payload: 40.0}}"
+    clearance = with_end_mark(f"{default_text()}\n{clearance_text()}")
+    loaded = with_end_mark(f"{default_text()}\nline_fill: 20.0\ntip: {{payload: 40.0}}")
     for text in (default_text(), clearance, whole, loaded, *map(example_text, example_names())):
         assert main(["check", "--strict", str(bench.text(text))]) == 0

@@ -7,7 +7,7 @@ import io
 from pathlib import Path
 
 import pytest
-from default_boom import default_text, examine, examine_text
+from default_boom import default_text, examine, examine_text, with_end_mark
 from ruamel.yaml import YAML
 
 from boom_twin import Scene, load_scene
@@ -28,7 +28,7 @@ EDITS = (
 
 
 def scene_of(text: str) -> Scene:
-    return examine_text(text, "test")[0]
+    return examine_text(text, "test", whole=True)[0]
 
 
 def in_blocks(text: str) -> str:
@@ -47,9 +47,9 @@ def changes(before: str, after: str) -> list[str]:
 
 @pytest.mark.parametrize("form", [str, in_blocks], ids=["braces", "blocks"])
 def test_the_edited_text_describes_the_edited_scene(form, tmp_path: Path) -> None:
-    text = form(default_text())
+    text = with_end_mark(form(default_text()))
     scene = scene_of(text)
-    after = rewritten(text, scene, edited(scene, EDITS))
+    after = with_end_mark(rewritten(text, scene, edited(scene, EDITS)))
     (tmp_path / "lean.yaml").write_text(after, encoding="utf-8")
     found, oddities = examine(tmp_path / "lean.yaml")
     lean = edited(scene, EDITS)
@@ -77,5 +77,5 @@ def test_every_variant_of_the_default_scene_is_a_scene(tmp_path: Path, one_of_a_
     kinds = {variant.kind: variant for variant in found}
     assert len(kinds) == len(KINDS) + 1  # numbers of shapes
     for variant in kinds.values() if one_of_a_kind else found:
-        path.write_text(rewritten(text, scene, variant.of(scene)), encoding="utf-8")
+        path.write_text(with_end_mark(rewritten(text, scene, variant.of(scene))), encoding="utf-8")
         assert examine(path)[0].model_dump() == variant.of(scene).model_dump() != scene.model_dump(), variant.name
