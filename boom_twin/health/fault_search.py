@@ -87,8 +87,8 @@ class FaultSearch:
         known = tuple(self._named)
         causes = {fault.cause for fault in known if not fault.is_size}
         possible = possible_faults(self._scene, self._reads, self._streams)
-        ends = [(fault._replace(kind="ended"), tuple(each for each in known if each is not fault)) for fault in known]
-        fewer = [each for each in ends if not each[0].cause.endswith(".sensor")]
+        ends = [fault for fault in known if fault.kind != "off"]
+        fewer = [(fault._replace(kind="ended"), tuple(each for each in known if each is not fault)) for fault in ends]
         more = [(fault, (*known, fault)) for fault in possible if fault.cause not in causes]
         faults, booms = zip((None, known), *fewer, *more, strict=True)
         found = [(fault, *each) for fault, each in zip(faults, self._cores.map(self._warm, booms), strict=True) if each]
