@@ -26,7 +26,7 @@ MISTAKES = [
     (
         "range_deg: [-150, 0]",
         "range_deg: [-2.6, 0]",
-        "line 38: joints[1].range_deg = [-2.6, 0.0]: both are within 6.28",
+        "line 38: joints[1].range_deg = [-2.6, 0.0]: both are within 6.28 degrees, and joints of booms turn further: radians?",
     ),
     ("kind: B1", "kind: B2", "line 37: joints[1].R is absent: a joint of kind B2 needs it."),
     ("beta: 1.0e-3", "betta: 1.0e-3", "line 15: sections[0].betta = 0.001: unknown key in sections[0]. The nearest known"),

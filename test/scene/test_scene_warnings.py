@@ -25,6 +25,7 @@ UNITS = [
     ("joints[1].cylinder.k", 30.0, "kN/mm?", "30 kN/mm are 3e+07"),
     ("joints[1].cylinder.oil -> joints[1].cylinder.oil.cap_line", OIL | {"cap_line": 2.0}, "litres?", "1e-3"),
     ("joints[1].cylinder.oil -> joints[1].cylinder.oil.rod_line", OIL | {"rod_line": 0.0}, "full stroke, 0.42 m"),
+    ("gravity", [0.0, 9.81], "along -y, which is down"),
     ("gravity", [0.0, -1.62], "9.81", "[0.0, -9.81]"),
     ("postures.bent", [1.05, 0.35, -0.52, -1.4], "radians?", "degrees"),
 ]  # fmt: skip
@@ -62,7 +63,7 @@ SLIPS = [
     ("material.E", 7e10, "1.7e+11 to 2.3e+11", "density of steel"),
     ("line_fill", 400.0, "whole load"),
     ("joints[1].cylinder.max_stroke", 1.13, "not the open length"),
-    ("tip -> tip.payload", {"payload": 40000.0}, "grams?", "line_fill"),
+    ("tip -> tip.payload", {"payload": 40000.0}, "half of what the boom weighs"),
 ]  # fmt: skip
 
 

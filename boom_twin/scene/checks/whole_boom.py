@@ -1,4 +1,4 @@
-"""Plausibility of the stretched-out boom: pressures, the give of oil, its first natural frequency and the damping of it.
+"""Plausibility of the stretched-out boom: payload, pressures, give of oil, first natural frequency, damping.
 
 The stretched-out boom is estimated by the flexibility of a cantilever, also for first guesses. It lies along x (a joint that
 cannot be straight is at the end of its range). Its beams are cut into cells that bend, its cylinders are springs in the joints,
@@ -38,14 +38,14 @@ TAKES = frozenset(
 def whole_boom(draft: Draft, odd: Sequence[str]) -> list[Fault]:
     """Return the first implausibility that only all parts together show.
 
-    Pressure, oil, frequency and damping are checked in this order: the first that is irregular causes what follows.
+    Payload, pressure, oil, frequency and damping are checked in this order: the first that is irregular causes what follows.
     `odd` are paths that have a finding already.
     """
     if any(path.rpartition(".")[2] in TAKES for path in odd):
         return []
     scene = draft.scene
     found = straight_boom(scene, np.array([joint.cylinder.middle_stiffness for joint in scene.joints]))
-    checks = (_pressure, _give, _stiff, _frequency, _damping)
+    checks = (_payload, _pressure, _give, _stiff, _frequency, _damping)
     turned = [path.removesuffix("range_deg") for path in odd if path.endswith("range_deg")]  # joints whose levers are no use
     findings = ([each for each in check(draft, scene, found) if not each.path.startswith(tuple(turned))] for check in checks)
     return next(filter(None, findings), [])
@@ -188,3 +188,10 @@ def _springs(scene: Scene, starts: Array, levers: Array, stiffnesses: Array) -> 
         found.append((starts[0], 1.0 / np.float64(scene.base.stiffness)))
     places, compliances = np.array(found or np.zeros((0, 2))).reshape(-1, 2).T
     return places, compliances
+
+
+def _payload(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
+    most_payload = 0.5  # of the boom's mass
+    if (boom := found.mass - scene.payload) > 0.0:
+        where, remedy = " kg, half of what the boom weighs", "Give kg; concrete in the pipe line is line_fill."
+        yield from draft.expect(("tip", "payload"), scene.payload, (0.0, most_payload), boom, where, remedy)
