@@ -255,22 +255,23 @@ class ReceiveQueue:
     def serve(self, turns: CallbackTurns) -> None:
         """Run callbacks for one turn and read messages as they arrive, in this thread and in order of arrival.
 
-        The turn ends if a message cannot be read at once: more must be taken from the executor first.
+        The turn ends if a message cannot be read at once: more must be taken from the executor first. In a flood, reading gets
+        as much time as taking, so predictions go on.
         """
         intake = 0.2  # time limit (s) for taking messages from the executor before some are read
-        if self:
-            turns.poll()
-        else:
+        if not self:
             self._on_put = partial(self._read_at_once, turns)
             try:
                 turns.run()
             finally:
                 self._on_put = None
-        end, before = time.monotonic() + intake, -1
-        while self.is_behind and self.received != before and time.monotonic() < end:
+        start, before = time.monotonic(), -1
+        if self:
+            turns.poll()
+        while self.is_behind and self.received != before and time.monotonic() < start + intake:
             before = self.received
             turns.poll()
-        self.work(BUDGET)
+        self.work(min(max(BUDGET, time.monotonic() - start), CATCH_UP))
 
     def _read_at_once(self, turns: CallbackTurns) -> None:
         if not self.is_behind:
