@@ -69,6 +69,13 @@ def test_a_lag_is_told_with_its_size(lag: float) -> None:
     assert alarm.told == "Stamps of joint angles are late. Correct their delay in the mapping."
 
 
+def test_an_alarm_tells_since_when_a_stream_is_late() -> None:
+    monitor = LagMonitor(Stream.STROKES)
+    assert not judged(monitor, 0.0, 20.0)
+    (alarm,) = judged(monitor, 0.2, 20.0, first=200)
+    assert 1e-9 * alarm.since == pytest.approx(20.0, abs=3.0)
+
+
 def test_strokes_are_late_if_all_other_streams_are_early() -> None:
     """If only the angles are early, these are it."""
     (strokes,) = judged(LagMonitor(Stream.STROKES), -0.03, 40.0, imu=-0.03)
