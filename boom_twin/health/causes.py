@@ -65,11 +65,11 @@ class Verdict(NamedTuple):
 class Likeliest(NamedTuple):
     """Most likely size of a fault.
 
-    spread : standard deviation by the jackknife over seconds, valid for an inexact model. onset : number of the first second.
-    probability : log posterior probability density, up to a constant common to all faults. agreement : sum of the gains of all
-    seconds over the root of the sum of their squares. If gains are independent and symmetric about zero, it exceeds t with a
-    probability below exp(-t^2/2) (B. Efron, J. Amer. Stat. Assoc. 64 (1969), 1278-1302). Each gain is bounded by the
-    evidence that a name needs.
+    spread : standard deviation by the jackknife over seconds, valid for an inexact model. onset : number of the first second
+    from which this size, or half of it, is likelier than none: a fault grows to its size. probability : log posterior
+    probability density, up to a constant common to all faults. agreement : sum of the gains of all seconds over the root of the
+    sum of their squares. If gains are independent and symmetric about zero, it exceeds t with a probability below exp(-t^2/2)
+    (B. Efron, J. Amer. Stat. Assoc. 64 (1969), 1278-1302). Each gain is bounded by the evidence that a name needs.
     """
 
     size: float
@@ -225,7 +225,7 @@ def likeliest(size: float, least: float, sure: float, gain: Callable[[float], Ar
     sure : float
         Upper bound on the gain of a second.
     gain : callable
-        Size -> gain of log likelihood over that of no fault, of each second since a possible onset, shape (k,).
+        Size -> gain of log likelihood over that of no fault, of each second that may be the first, shape (k,).
 
     Returns
     -------
@@ -256,6 +256,5 @@ def likeliest(size: float, least: float, sure: float, gain: Callable[[float], Ar
     found = sizes[best] + change
     probability = INDEPENDENT * float(gains[best][first]) - 0.5 * (found / size) ** 2
     own = np.clip(INDEPENDENT * gain(found)[first:], -sure, sure)
-    return Likeliest(
-        found, float(np.linalg.norm(without)), first, probability, float(own.sum() / max(np.linalg.norm(own), TINY))
-    )
+    agreement, half = float(own.sum() / max(np.linalg.norm(own), TINY)), int(gained(0.5 * found).argmax())
+    return Likeliest(found, float(np.linalg.norm(without)), min(first, half), probability, agreement)

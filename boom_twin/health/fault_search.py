@@ -130,7 +130,7 @@ class FaultSearch:
         self._certain = NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - self._settings.name_odds) / len(self._faults))  # Bonferroni
         errors = [usual_size(self._scene, fault, self._settings.scene_error) for fault in self._faults]
         named = {fault.cause for fault in self._named}
-        self._decision, self._age = Evidence(self._scene, self._faults, self._settings, errors, self._certain, named), 0
+        self._decision, self._age = Evidence(self._scene, self._faults, self._settings, errors, self._certain, named), -SETTLING
         self._quiet = 0.0  # evidence that the filters expect too much unknown force
         self._unsure: dict[int, float] = {}  # evidence of faults below which their sizes are not looked for again
         self._evidence = np.array([twin.evidence for twin in self._twins])
@@ -188,7 +188,7 @@ class FaultSearch:
         grown = self._evidence - before
         grown[np.isnan(grown)] = np.nanmin(grown)  # a twin that diverged is as unlikely as the least likely one
         self._age += 1
-        if self._age <= SETTLING:
+        if self._age <= 0:
             return []
         if (fault := self._back_again()) is not None:
             return self._ended(fault, stamp)
@@ -229,7 +229,7 @@ class FaultSearch:
         for place, size in verdict.sizes.items() if fault.is_size else ():
             faults[place] = self._faults[place]._replace(size=math.copysign(self._faults[place].size, size))
         # of size 0 all are the boom as believed
-        healthy = np.zeros(0) if fault.kind == "off" else self._course(fault._replace(size=0.0), begin)
+        healthy = np.zeros(0) if fault.kind == "off" else self._course(fault._replace(size=0.0))
         found = {place: each for place, trial in faults.items() if (each := self._sized(trial, begin, healthy)) is not None}
         likely = {place: each[3] for place, each in found.items()}
         best = max(likely, key=lambda place: likely[place], default=verdict.place)
@@ -299,11 +299,11 @@ class FaultSearch:
         return None
 
     def _sized(self, fault: Fault, onset: int, healthy: Array) -> tuple[Fault, float, int, float] | None:
-        """Return the fault of the most likely size, the size's deviation, the onset (from `onset` on, ns), the log posterior.
+        """Return the fault of the most likely size, the size's deviation, the fault's onset (ns), the log posterior.
 
-        `healthy` is the log likelihood of each second of the boom as believed; a zero's size does not depend on it. Return None
-        if the size is not certainly above that of healthy booms, if the seconds do not agree, or if the size of a force fault
-        is below `Settings.force_deviation`.
+        `healthy` is the course of the boom as believed, and `onset` that of a sensor's zero, which does not depend on it.
+        Return None if the size is not certainly above that of healthy booms, if the seconds do not agree, or if the size of a
+        force fault is below `Settings.force_deviation`.
         """
         usual = usual_size(self._scene, fault, self._settings.scene_error)
         if fault.kind == "off":
@@ -313,23 +313,22 @@ class FaultSearch:
             is_known = abs(changed.size) > max(least, self._certain * spread)
             return (changed, math.hypot(spread, drift), onset, 0.0) if is_known else None
         least, sure = self._certain * usual, self._decision.sure
-        found = likeliest(fault.size, least, sure, lambda size: self._course(fault._replace(size=size), onset) - healthy)
+        found = likeliest(fault.size, least, sure, lambda size: self._course(fault._replace(size=size)) - healthy)
         if found is None:
             return None
         spread = math.hypot(found.spread, usual)
         is_known = abs(found.size) > self._certain * spread and found.agreement > math.sqrt(2.0 * sure)
-        return (fault._replace(size=found.size), spread, onset + found.onset * SECOND, found.probability) if is_known else None
+        begun = [second.stamp for second in self._recent][-self._age :][found.onset]
+        return (fault._replace(size=found.size), spread, begun, found.probability) if is_known else None
 
-    def _course(self, fault: Fault, onset: int) -> Array:
-        """Return the log likelihood of each recent second since the onset; `IMPOSSIBLE` for an impossible boom."""
-        total, found = 0.0, list[float]()
+    def _course(self, fault: Fault) -> Array:
+        """Return the log likelihood of each second that counts as evidence; `IMPOSSIBLE` for an impossible boom."""
+        totals = [0.0]
         try:
-            for stamp, twin in self._repeated(fault):
-                found += [twin.evidence - total] * (stamp >= onset)
-                total = twin.evidence
+            totals += [twin.evidence for _, twin in self._repeated(fault)]
         except BoomTwinError:
-            return np.full(sum(second.stamp >= onset for second in self._recent), IMPOSSIBLE)
-        return np.nan_to_num(found, nan=IMPOSSIBLE)
+            return np.full(min(self._age, len(self._recent)), IMPOSSIBLE)
+        return np.nan_to_num(np.diff(totals)[-self._age :], nan=IMPOSSIBLE)
 
     def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float, float]:
         """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), the standard deviation, the drift.

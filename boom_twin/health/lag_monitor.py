@@ -66,7 +66,8 @@ class LagMonitor:
     def _judge(self, end: int) -> list[Alarm]:
         """Begin and end alarms by the present lags."""
         found = {stream: _lag(means) for stream, means in self._means.items()}
-        lags, begun = {stream: lag for stream, (lag, _) in found.items()}, {stream: start for stream, (_, start) in found.items()}
+        lags = {stream: lag for stream, (lag, _) in found.items()}
+        begun = {stream: start for stream, (_, start) in found.items()}
         late = {stream: lag for stream, lag in lags.items() if lag.left < CLEAR and _exceeds(lag)}
         if late and max(late.values()).lag < 0.0:
             surest = min(late.values(), key=lambda lag: lag.sigma)

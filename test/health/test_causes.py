@@ -131,7 +131,14 @@ def test_seconds_must_agree_on_a_size():
     found = [likeliest(0.25, 0.06, math.log(19.0), gain(gains)) for gains in (even, jump)]
     assert all(each.size == pytest.approx(0.35, abs=0.02) and each.probability > 10.0 for each in found)
     assert found[0].agreement == pytest.approx(math.sqrt(20)) and found[1].agreement < 0.0
-    assert gain(even)(0.18).sum() < gain(even)(0.0).sum()
+    assert gain(even)(0.18).sum() < gain(even)(0.0).sum() and found[0].onset == 0
+
+
+def test_the_onset_is_that_of_half_the_size_as_a_fault_grows():
+    """The gain of a size x at a true one y is that of a linear model, x (y - x / 2); y grows from second 10 to 14."""
+    true = 0.36 * np.clip((np.arange(20) - 9.5) / 4.0, 0.0, 1.0)
+    found = likeliest(0.25, 0.06, math.log(19.0), lambda size: 1e3 * size * (true - 0.5 * size))
+    assert found.size == pytest.approx(0.34, abs=0.02) and found.onset == 11  # 12 by the whole size
 
 
 def innovations_of(values, count=None):
