@@ -228,9 +228,9 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callab
         if furthest < CLOSE or passes == MOST:
             break
         step = bounded_minimum(precision, pull, problem.least - at)
+        furthest = float((np.abs(step) / np.sqrt(np.diag(np.linalg.inv(precision)))).max())
         step /= max(1.0, float(np.abs(step).max()))  # one deviation of a prior at most
-        step = _shortened(problem, at, step, noise, base)
-        at, furthest = at + step, float((np.abs(step) / np.sqrt(np.diag(np.linalg.inv(precision)))).max())
+        at = at + _shortened(problem, at, step, noise, base)
         if learning and furthest < 1.0:  # near enough to learn the noise for the last time
             noise = problem.noise(at, np.maximum(stated, stated * _mean_squares(problem, base)))
             learning = False

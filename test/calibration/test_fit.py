@@ -76,8 +76,10 @@ class Bent(CalibrationProblem):
         assert deviations[0] >= self.least[0]
         return dict(zip("ab", deviations.tolist(), strict=True))
 
+    bend = 100.0
+
     def innovations(self, trials, noise):
-        bent = [trial["a"] + trial["b"] + 100.0 * trial["a"] ** 2 for trial in trials]
+        bent = [trial["a"] + trial["b"] + self.bend * trial["a"] ** 2 for trial in trials]
         return [np.column_stack([self.readings - each, np.ones(40)]) for each in bent]
 
     def slopes_by_model(self, *_):
@@ -93,3 +95,13 @@ def test_derivatives_are_right_where_readings_bend_and_do_not_leave_the_bounds()
 def test_a_fit_that_still_moves_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fit, "MOST", 1)
     assert not fitted(Bent(), (), lambda passes: None).is_settled
+
+
+def test_a_step_that_had_to_be_shortened_is_no_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Readings of 10 bend so fast that the first step ends at 1/32 of its length, with residuals of 1000."""
+    monkeypatch.setattr(Bent, "bend", 1e6)
+    problem = Bent()
+    problem.readings = np.full(40, 10.0)
+    found = fitted(problem, (), lambda passes: None)
+    (left,) = problem.innovations([problem.values(found.deviations)], None)
+    assert found.is_settled == (abs(left[:, 0]).max() < 3.0), (found, left[0])
