@@ -24,7 +24,7 @@ from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
 from .causes import INDEPENDENT, MEMORY, Evidence, Verdict, likeliest, scores
-from .creep import SPAN, CreepMonitor
+from .deviations import CREEP_SPAN, CreepMonitor
 from .faults import QUIET, Fault, Follower, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
 from .sensor_check import CAME_BACK, Flags
 
@@ -265,13 +265,13 @@ class FaultSearch:
     def _may_leak(self, fault: Fault, age: int) -> bool:
         """Return True if an apparent softer spring of this `age` (ns) may be a leak, or a stroke transducer that is off.
 
-        A leak would show within `SPAN`. A named sensor fault of the joint may be one of its stroke transducer.
+        A leak would show within `CREEP_SPAN`. A named sensor fault of the joint may be one of its stroke transducer.
         """
         if not fault.cause.startswith("cylinder_"):
             return False
         number = int(fault.channel.removeprefix("cylinder_"))
         is_off = any(each.cause == f"joint_{number}.sensor" for each in self._named)
-        return is_off or number - 1 in self._creep.creeping or age < SPAN * SECOND
+        return is_off or number - 1 in self._creep.creeping or age < CREEP_SPAN * SECOND
 
     def _changed_size(self, named: Fault, change: Fault, spread: float, onset: int) -> list[Alarm]:
         """Change the size of a named fault; if the rest is that of a healthy boom, end the fault and return its alarm."""

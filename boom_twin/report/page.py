@@ -13,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from .. import __version__
-from ..analysis.free_vibration import Vibration
+from ..analysis.sample_series import Vibration
 from ..offline.history import course
 from ..offline.recording import Recording, noise_told
 from ..plots import AlarmSpan
