@@ -19,7 +19,7 @@ from ..offline.recording import Recording, noise_told
 from ..plots import AlarmSpan
 from ..plots.results import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import DEPTH_BY_GYRATION
-from ..system.atomic_files import write_atomic
+from ..system.files import write_atomic
 from ..texts import alarm_sentence
 from ..twin.blocks import event_meaning
 from ..types import SECOND, SENSORS, Stream
