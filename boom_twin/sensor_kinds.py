@@ -1,4 +1,4 @@
-"""Kinds of sensors: names, units and messages of one stream."""
+"""Kinds of sensors: names, units and messages of each stream."""
 
 from __future__ import annotations
 
@@ -73,6 +73,55 @@ class SensorKind:
         return tuple(f"{self.stem}_{end}" for end in self.ends or range(1, joints + 1))
 
 
+STROKES = SensorKind(
+    title="cylinder strokes",
+    stem="cylinder",
+    units={"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
+    noise="stroke_sigma",
+    resolution="stroke_resolution",
+    lack="nothing can be replayed",
+    shown="mm",
+)
+ANGLES = SensorKind(
+    title="joint angles",
+    stem="joint",
+    units={"rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0, "gon": pi / 200.0},
+    noise="angle_sigma",
+    resolution="angle_resolution",
+    lack="there are no joint residuals",
+    shown="mrad",
+)
+FORCES = SensorKind(
+    title="cylinder forces",
+    stem="cylinder_force",
+    units={"N": 1.0, "daN": 10.0, "kN": 1e3, "lbf": 4.4482216152605},
+    noise="force_sigma",
+    resolution="force_resolution",
+    field="effort",
+    part="cylinder",
+    alarms=("stuck", "dropout"),
+)
+PRESSURES = SensorKind(
+    title="cylinder pressures",
+    stem="cylinder",
+    ends=("cap", "rod"),
+    units={"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "psi": 6894.757293168},
+    noise="pressure_sigma",
+    field="effort",
+    gives="cylinder_forces",
+)
+MOMENTS = SensorKind(
+    title="bending moments",
+    stem="moment",
+    units={"N m": 1.0, "kN m": 1e3},
+    noise="moment_sigma",
+    field="effort",
+    is_placed=True,
+    shown="kN m",
+    alarms=("stuck", "dropout"),
+)
+
+
 def imu_kind(stem: str, lack: str = "") -> SensorKind:
     """Return the accelerometers of an IMU."""
     return SensorKind(
@@ -90,6 +139,9 @@ def imu_kind(stem: str, lack: str = "") -> SensorKind:
     )
 
 
+TIP_IMU = imu_kind("tip_imu", lack="there are no residuals of the tip's acceleration (optional)")
+
+
 def gyro_kind(imu: SensorKind) -> SensorKind:
     """Return the gyro of an IMU, which reads how fast its place is raised."""
     return replace(
@@ -103,4 +155,21 @@ def gyro_kind(imu: SensorKind) -> SensorKind:
         axes=("y",),
         beside=imu.stem,
         shown="mrad/s",
+    )
+
+
+def point_kind(stem: str) -> SensorKind:
+    """Return the positions of a named point, as a total station or a camera measures them."""
+    return SensorKind(
+        title=stem.replace("_", " "),
+        message="geometry_msgs/msg/PointStamped",
+        stem=stem,
+        ends=("x", "z"),
+        units={"m": 1.0, "mm": 1e-3},
+        noise="point_sigma",
+        field="point",
+        axes=("x", "z"),
+        is_placed=True,
+        shown="mm",
+        alarms=(),
     )

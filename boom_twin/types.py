@@ -10,7 +10,7 @@ from math import pi
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from .predictions import Estimate, Prediction
-from .sensor_kinds import SensorKind, gyro_kind, imu_kind
+from .sensor_kinds import ANGLES, FORCES, MOMENTS, PRESSURES, STROKES, TIP_IMU, SensorKind, gyro_kind, imu_kind, point_kind
 from .texts import alarm_text
 
 if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
@@ -104,73 +104,22 @@ NO_CHANNELS: Mapping[str, Channel] = {}
 NO_PLACES: Mapping[str, Place] = {}  # of a boom whose only placed sensor is the tip IMU, at the tip
 
 SENSORS: dict[Stream, SensorKind] = {
-    Stream.STROKES: SensorKind(
-        title="cylinder strokes",
-        stem="cylinder",
-        units={"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
-        noise="stroke_sigma",
-        resolution="stroke_resolution",
-        lack="nothing can be replayed",
-        shown="mm",
-    ),
-    Stream.ANGLES: SensorKind(
-        title="joint angles",
-        stem="joint",
-        units={"rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0, "gon": pi / 200.0},
-        noise="angle_sigma",
-        resolution="angle_resolution",
-        lack="there are no joint residuals",
-        shown="mrad",
-    ),
-    Stream.IMU: imu_kind("tip_imu", "there are no residuals of the tip's acceleration (optional)"),
-    Stream.FORCES: SensorKind(
-        title="cylinder forces",
-        stem="cylinder_force",
-        units={"N": 1.0, "daN": 10.0, "kN": 1e3, "lbf": 4.4482216152605},
-        noise="force_sigma",
-        resolution="force_resolution",
-        field="effort",
-        part="cylinder",
-        alarms=("stuck", "dropout"),
-    ),
+    Stream.STROKES: STROKES,
+    Stream.ANGLES: ANGLES,
+    Stream.IMU: TIP_IMU,
+    Stream.FORCES: FORCES,
+    Stream.RATE: gyro_kind(TIP_IMU),
+    Stream.IMU_2: imu_kind("imu_2"),
+    Stream.RATE_2: gyro_kind(imu_kind("imu_2")),
+    Stream.IMU_3: imu_kind("imu_3"),
+    Stream.RATE_3: gyro_kind(imu_kind("imu_3")),
+    Stream.IMU_4: imu_kind("imu_4"),
+    Stream.RATE_4: gyro_kind(imu_kind("imu_4")),
+    Stream.MOMENTS: MOMENTS,
+    Stream.POINT: point_kind("points"),
+    Stream.POINT_2: point_kind("points_2"),
+    Stream.PRESSURES: PRESSURES,
 }
-SENSORS[Stream.RATE] = gyro_kind(SENSORS[Stream.IMU])
-for _accelerometer, _rate in ((Stream.IMU_2, Stream.RATE_2), (Stream.IMU_3, Stream.RATE_3), (Stream.IMU_4, Stream.RATE_4)):
-    SENSORS[_accelerometer] = imu_kind(_accelerometer.value)
-    SENSORS[_rate] = gyro_kind(SENSORS[_accelerometer])
-SENSORS[Stream.MOMENTS] = SensorKind(
-    title="bending moments",
-    stem="moment",
-    units={"N m": 1.0, "kN m": 1e3},
-    noise="moment_sigma",
-    field="effort",
-    is_placed=True,
-    shown="kN m",
-    alarms=("stuck", "dropout"),
-)
-for _point in (Stream.POINT, Stream.POINT_2):
-    SENSORS[_point] = SensorKind(
-        title=_point.value.replace("_", " "),
-        message="geometry_msgs/msg/PointStamped",
-        stem=_point.value,
-        ends=("x", "z"),
-        units={"m": 1.0, "mm": 1e-3},
-        noise="point_sigma",
-        field="point",
-        axes=("x", "z"),
-        is_placed=True,
-        shown="mm",
-        alarms=(),
-    )
-SENSORS[Stream.PRESSURES] = SensorKind(
-    title="cylinder pressures",
-    stem="cylinder",
-    ends=("cap", "rod"),
-    units={"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "psi": 6894.757293168},
-    noise="pressure_sigma",
-    field="effort",
-    gives=Stream.FORCES.value,
-)
 """In the order of `Stream`. Expected readings are in `boom_twin.deviation.channels`, topics in ``topics.yaml``."""
 
 

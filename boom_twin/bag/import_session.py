@@ -24,7 +24,7 @@ from ..loggers.times import Stamps, TableTimes, read_times, zone_of
 from ..messages.cdr_encoder import STAMP, EncodedBlock, EncodedRows, NumberFields, Template
 from ..messages.mapping import load_mapping, mapping_from
 from ..messages.topic_table import Topics, load_topics
-from ..system.received_files import open_received
+from ..system.files import open_received
 from ..types import NANO, SECOND, SENSORS, Array, Sample, Stream, channels_of, sensor_kind, stream_of
 from .metadata import dump
 from .session_file import IN_ORDER, LogClock, SessionFile, as_bag_error, channel_of, schema_of

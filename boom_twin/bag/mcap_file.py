@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..errors import BagError
 from ..messages.cdr_decoder import Integers, MessageBlock, by_log_time, gather
-from ..system.received_files import open_received
+from ..system.files import open_received
 from .mcap_records import (
     HEADS,
     LARGEST_SUMMARY,

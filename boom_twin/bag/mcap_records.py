@@ -20,7 +20,7 @@ from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdDecompressor, ZstdError
 
 from ..errors import BagError
-from ..system.received_files import open_received
+from ..system.files import open_received
 from .session_file import MOST_HELD, MOST_TOGETHER, REMEDY
 
 PROFILE = "ros2"

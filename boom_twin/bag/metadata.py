@@ -16,7 +16,7 @@ from ruamel.yaml import YAML
 from ..config.yaml_text import plain, read_plain
 from ..errors import BagError
 from ..messages.topic_table import Qos
-from ..system.atomic_files import write_atomic
+from ..system.files import write_atomic
 
 FILE_NAME = "metadata.yaml"
 

@@ -22,7 +22,7 @@ from rosbags.typesys import TypesysError, get_types_from_msg
 
 from ..errors import BagError
 from ..messages.type_store import jazzy, other_than_jazzy
-from ..system.received_files import holds_file, open_received
+from ..system.files import holds_file, open_received
 from .session_file import CDR, IN_ORDER, MOST_HELD, PARSE_ERRORS, PIECE, LogClock, SessionFile, channel_of, schema_of
 
 MAGIC = b"SQLite format 3\0"

@@ -23,7 +23,7 @@ from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 
 from ..errors import BagError
 from ..messages.type_store import other_than_jazzy
-from ..system.received_files import holds_file, sha256_of
+from ..system.files import holds_file, sha256_of
 from ..types import NANO
 from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata, refuse_packed
 from .session_file import CDR, WHOLE, SessionBlocks, SessionFile, TimeWindow, compare_counts

@@ -11,8 +11,7 @@ from mcap.opcode import Opcode
 
 from ..config.yaml_text import LARGEST_FILE
 from ..errors import BagError
-from ..system.atomic_files import write_atomic
-from ..system.received_files import holds_file, open_received
+from ..system.files import holds_file, open_received, write_atomic
 from ..system.result_folder import RECOVER, result_folder
 from .mcap_records import MESSAGE_HEAD, parts
 from .metadata import BagMetadata, Recorded, offered_qos, profiles

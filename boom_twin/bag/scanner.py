@@ -18,7 +18,7 @@ from mcap.records import Channel, Chunk, DataEnd, Header, Metadata, Schema, Stat
 from mcap.writer import MCAP0_MAGIC
 
 from ..errors import BagError
-from ..system.received_files import open_received
+from ..system.files import open_received
 from .mcap_records import (
     BLOCK,
     KINDS,

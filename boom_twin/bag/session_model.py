@@ -24,8 +24,7 @@ from ..messages.topic_table import Topics
 from ..scene.edit import anew, differences
 from ..scene.load import DEFAULT_NAME, SceneSource, as_scene, default_text, examine_text, read_text
 from ..scene.schema import Scene
-from ..system.atomic_files import write_atomic
-from ..system.received_files import holds_file
+from ..system.files import holds_file, write_atomic
 from ..system.result_folder import UNFINISHED, is_unfinished
 from ..types import Stream, StrokeReading
 from .metadata import dump

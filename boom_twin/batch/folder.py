@@ -16,8 +16,7 @@ from .. import __version__
 from ..bag.reader import is_session
 from ..bag.session_model import session_yaml
 from ..errors import BagError, UsageError
-from ..system.atomic_files import DRAFT, write_atomic
-from ..system.received_files import real_path
+from ..system.files import DRAFT, real_path, write_atomic
 from ..system.terminal_text import printable
 from .session_task import ALARM, Row
 

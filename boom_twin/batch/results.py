@@ -18,7 +18,7 @@ from scipy.stats import t as student
 from ..plots.results import Trend, trends_picture
 from ..report.fatigue import LIVES, hours_as_text, hours_to_end, yearly_as_text
 from ..report.page import HOUR, render
-from ..system.atomic_files import write_atomic
+from ..system.files import write_atomic
 from ..system.result_text import json_text
 from ..types import SECOND, sensor_kind
 from .folder import PAGE, RIGS, SESSIONS

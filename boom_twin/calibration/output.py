@@ -15,7 +15,7 @@ from ..messages.topic_table import factor
 from ..scene.edit import rewritten
 from ..scene.load import with_end_mark
 from ..scene.schema import Scene
-from ..system.atomic_files import check_target, write_atomic
+from ..system.files import check_target, write_atomic
 from ..types import Stream
 from .run import Calibration, Estimate
 

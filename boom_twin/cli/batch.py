@@ -83,7 +83,7 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
     from .. import __version__
     from ..batch.folder import fingerprint, key_of
     from ..batch.session_task import SessionTask
-    from ..system.received_files import sha256_of
+    from ..system.files import sha256_of
 
     given = {name: getattr(args, name) for name in ("scene", "params", "mapping")}
     paths = {name: None if path is None else str(Path(path).resolve()) for name, path in given.items()}

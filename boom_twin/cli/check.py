@@ -15,7 +15,7 @@ from ..scene.load import DEFAULT_NAME, examine
 from ..scene.schema import Base, Clearance
 from ..scene.segmentation import LEAST_PARTS
 from ..scene.summary import STATIONS, UNKNOWNS_BASE, UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
-from ..system.atomic_files import check_target
+from ..system.files import check_target
 from ..types import Place, Stream, StrokeReading
 from . import reduce as need
 from .arguments import SENSOR_LIST, add_file, add_json, add_scene, files_of, sensors_of

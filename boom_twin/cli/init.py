@@ -11,7 +11,7 @@ from pathlib import Path
 from ..errors import UsageError
 from ..scene.boom_table import read_table
 from ..scene.first_scene import first_scene
-from ..system.atomic_files import check_target, write_atomic
+from ..system.files import check_target, write_atomic
 from .output import tell_oddities
 
 

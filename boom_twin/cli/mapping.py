@@ -35,7 +35,7 @@ def run(args: Namespace) -> int:
 def _check(args: Namespace) -> int:
     from ..config.yaml_text import whole_text
     from ..offline.commissioning import commission
-    from ..system.atomic_files import check_target, write_atomic
+    from ..system.files import check_target, write_atomic
     from .output import open_session_scene, print_result
 
     if args.out is not None:

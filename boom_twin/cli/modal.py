@@ -30,7 +30,7 @@ def run(args: Namespace) -> int:
     from ..calibration.sessions import Rigging, read_sessions
     from ..plots.results import stabilisation_picture
     from ..report.operational_modes import measured_rests
-    from ..system.atomic_files import write_atomic
+    from ..system.files import write_atomic
     from ..system.result_folder import MODAL, result_folder
 
     bag, out = Path(args.bag), Path(args.out)

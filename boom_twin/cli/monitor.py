@@ -89,8 +89,7 @@ def _live_feed(args: Namespace) -> Iterator[Feed]:
 async def _serve(args: Namespace, feed: Feed) -> None:
     import asyncio
 
-    from ..monitor.access_control import AccessControl, token_of
-    from ..monitor.server import Server, serving
+    from ..monitor.server import AccessControl, Server, serving, token_of
     from ..monitor.viewer import ViewerActions
     from ..ros.startup import stop_signals
 

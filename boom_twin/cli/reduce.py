@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..scene import Scene
 from ..scene.block_reader import quantity
 from ..scene.load import default_text, read_text, with_end_mark
-from ..system.atomic_files import check_new, write_atomic
+from ..system.files import check_new, write_atomic
 from .arguments import add_file, files_of, refuse_given
 
 if TYPE_CHECKING:

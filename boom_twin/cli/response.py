@@ -82,7 +82,7 @@ def _rates(text: str) -> tuple[float, float, int]:
 
 def run(args: Namespace) -> int:
     from ..analysis.equilibrium import statics
-    from ..system.atomic_files import write_atomic
+    from ..system.files import write_atomic
     from ..system.result_folder import RESPONSE, result_folder
 
     scene = open_scene(args.scene)

@@ -105,8 +105,9 @@ def run(args: Namespace) -> int:
     from ..bag.session_writer import samples_in_rows, write_samples
     from ..offline.ground_truth import FILE_NAME
     from ..system.result_folder import RIG, result_folder
-    from ..validation.rig import BUNDLED_DURATION, Sensors, bundled, faults, loads, random_programme, through_postures
+    from ..validation.rig import BUNDLED_DURATION, Sensors, bundled, faults, random_programme, through_postures
     from ..validation.rig import record as record_session
+    from ..validation.rig.motion import check_loads, parse_load, tip_load
 
     assumed, out = scene_from(args.scene), Path(args.out)
     tell_oddities(assumed.oddities, assumed.source)
@@ -123,9 +124,9 @@ def run(args: Namespace) -> int:
     faults.check(wrong, scene, duration)
     _refuse_unrecorded([fault.cause for fault in wrong], args.sensors, recorded)
     boom, changes = faults.changes(faults.wrong_by(scene, args.wrong, args.rig_seed), wrong)
-    pushing = [loads.parse(text) for text in args.load]
-    loads.check(pushing, duration)
-    load = loads.tip_load(scene, pushing, duration, args.seed) if pushing else None
+    pushing = [parse_load(text) for text in args.load]
+    check_loads(pushing, duration)
+    load = tip_load(scene, pushing, duration, args.seed) if pushing else None
     if args.through:
         programme = through_postures(scene, args.through.split(","), duration, args.tip_acceleration)
     else:

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import UsageError
 from ..loggers.log_table import CsvLogTable, columns_of
 from ..scene import Scene
-from ..system.atomic_files import check_target, write_atomic
+from ..system.files import check_target, write_atomic
 from ..system.result_text import csv_text, numbers
 from ..types import Array
 from .arguments import add_json, add_scene, files_of, not_negative

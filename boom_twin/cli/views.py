@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from ..errors import BoomTwinError
-from ..system.atomic_files import write_atomic
+from ..system.files import write_atomic
 from .arguments import add_namespace
 
 

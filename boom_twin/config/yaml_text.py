@@ -20,7 +20,7 @@ from ruamel.yaml.scalarstring import LiteralScalarString
 from ruamel.yaml.util import load_yaml_guess_indent
 
 from ..errors import BoomTwinError, Fault, FaultKind
-from ..system.received_files import open_received
+from ..system.files import open_received
 from ..system.terminal_text import printable
 
 LARGEST_FILE = 4 * 2**20  # bytes, size limit of a file that is read
@@ -36,7 +36,7 @@ Place = tuple[str | int, ...]
 def read_plain(path: Path, failure: type[BoomTwinError], remedy: str, received: bool = False) -> Any:
     """Return the values of a YAML file. Raise `failure` with path, reason and remedy if it cannot be read.
 
-    `received` is True for a file in a received folder, see `boom_twin.system.received_files.open_received`.
+    `received` is True for a file in a received folder, see `boom_twin.system.files.open_received`.
     """
     try:
         with open_received(path) if received else path.open("rb") as stream:

@@ -8,39 +8,37 @@ named fault becomes part of the boom as believed. So a second fault, and the end
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import repeat
 from statistics import NormalDist
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..config.settings import Settings
 from ..deviation.states import Innovations
-from ..errors import BoomTwinError
 from ..scene.schema import Scene
-from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
+from ..types import SECOND, Alarm, Array, Ranked, Stream, StrokeReading
 from .causes import INDEPENDENT, MEMORY, Evidence, Verdict, likeliest, scores
-from .creep import SPAN, CreepMonitor
-from .faults import QUIET, Fault, Follower, Hypothesis, evidence_of, hypothesis, possible_faults, usual_size
-from .sensor_check import CAME_BACK, Flags
+from .deviations import CREEP_SPAN, CreepMonitor
+from .faults import (
+    QUIET,
+    Fault,
+    Follower,
+    Hypothesis,
+    Second,
+    TwinMaker,
+    evidence_of,
+    feed,
+    hypothesis,
+    possible_faults,
+    usual_size,
+)
+from .sensor_check import CAME_BACK
 
-IMPOSSIBLE = -1e9  # log likelihood of a boom whose twin fails
 DELAY = 2  # s from the end of a second to its verdict
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
-WARM_UP = 10  # s of recent samples that new twins take first: they know neither motion nor zeros when they start
-
-
-class Second(NamedTuple):
-    """Samples of a second that begins at `stamp` (ns), and the failing channels to leave out; or a change."""
-
-    stamp: int
-    block: Any = None
-    left_out: tuple[Flags, Flags] | None = None
-    change: Change | None = None
 
 
 class FaultSearch:
@@ -66,13 +64,11 @@ class FaultSearch:
         reads: StrokeReading = StrokeReading.LENGTH,
         threads: int = 1,  # among which the twins are shared
     ) -> None:
-        self._scene, self._make, self._settings, self._reads = scene, make, settings, reads
+        self._scene, self._settings, self._reads = scene, settings, reads
+        self._maker = TwinMaker(scene, make, MEMORY)
         self._cores = ThreadPoolExecutor(threads, "fault twins")  # twins do not depend on each other
-        self._recent: deque[Second] = deque(maxlen=MEMORY)
-        self._change: Change | None = None
         self._creep = CreepMonitor(scene)
         self._named: dict[Fault, Alarm] = {}
-        self._expects = 1.0  # unknown force that the filters expect, over the set one
         self._zeros_before: dict[str, tuple[int, float]] = {}  # place among a sensor's zeros, and its value before the onset
         self._streams: set[Stream] = set()  # those that have come
         self._hypotheses: list[Hypothesis] = []
@@ -91,21 +87,10 @@ class FaultSearch:
         fewer = [(fault._replace(kind="ended"), tuple(each for each in known if each is not fault)) for fault in ends]
         more = [(fault, (*known, fault)) for fault in possible if fault.cause not in causes]
         faults, booms = zip((None, known), *fewer, *more, strict=True)
-        found = [(fault, *each) for fault, each in zip(faults, self._cores.map(self._warm, booms), strict=True) if each]
+        found = [(fault, *each) for fault, each in zip(faults, self._cores.map(self._maker.warm, booms), strict=True) if each]
         self._faults = [fault for fault, _, _ in found if fault is not None]
         self._hypotheses, self._twins = [each for _, each, _ in found], [twin for _, _, twin in found]
         self._decide_anew()
-
-    def _warm(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower] | None:
-        """Return the hypothesis of these faults, and its twin after the newest seconds; None for an impossible boom."""
-        try:
-            each, twin = self._made(faults)
-            for second in list(self._recent)[-WARM_UP:]:
-                _feed(twin, each, second)
-            twin.take_innovations()
-        except BoomTwinError:  # such as one with a part too soft to hold it
-            return None
-        return each, twin
 
     def _believe(self, fault: Fault, place: int = 0) -> None:
         """Add a named fault (twin `place`) to the boom as believed, or remove it (0); restart twins unless a sensor is off."""
@@ -119,7 +104,7 @@ class FaultSearch:
         for i, (twin, own) in enumerate(zip(self._twins, doubted, strict=True)):
             twin.doubt(own)
             self._hypotheses[i] = self._hypotheses[i]._replace(doubted=own)
-        if not place and (found := self._warm((*self._named, fault))) is not None:
+        if not place and (found := self._maker.warm((*self._named, fault))) is not None:
             self._hypotheses.append(found[0])
             self._twins.append(found[1])
             self._faults.append(fault._replace(size=0.0))
@@ -135,14 +120,6 @@ class FaultSearch:
         self._unsure: dict[int, float] = {}  # evidence of faults below which their sizes are not looked for again
         self._evidence = np.array([twin.evidence for twin in self._twins])
 
-    def _made(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower]:
-        each = hypothesis(self._scene, faults)
-        each = each._replace(expects=self._expects * each.expects)
-        twin = self._make(each)
-        if self._change is not None:
-            twin.requests.repeat(each.changed(self._change))
-        return each, twin
-
     def close(self) -> None:
         """End the threads; a call that they work for fails."""
         self._cores.shutdown(cancel_futures=True)
@@ -150,8 +127,7 @@ class FaultSearch:
     def __call__(self, second: Second) -> list[Alarm]:
         """Let all twins take a second or a change; return the alarms that begin or end."""
         if second.change is not None:
-            self._recent.clear()
-            self._change = second.change
+            self._maker.restart(second.change)
             for each, twin in zip(self._hypotheses, self._twins, strict=True):
                 twin.requests.repeat(each.changed(second.change))
             if self._twins:
@@ -161,26 +137,21 @@ class FaultSearch:
         if not come <= self._streams:
             self._streams |= come
             self._begin()
-        if second.left_out is not None and self._is_newly_left_out(second.left_out):  # its last readings misled all states
-            self._recent = deque((each._replace(left_out=second.left_out) for each in self._recent), MEMORY)
+        if second.left_out is not None and self._maker.is_news(second.left_out):  # its last readings misled all states
+            self._maker.leave_out(second.left_out)
             self._begin()
-        self._recent.append(second)
+        self._maker.recent.append(second)
         leaks = [] if self._reads is StrokeReading.ANGLE else self._creep.take(second.stamp, second.block)
         if leaks:
             self._decide_anew()
         doubts = self._twins[0].doubts
-        list(self._cores.map(_feed, self._twins, self._hypotheses, repeat(second)))  # waits for all, and raises what one raised
+        list(self._cores.map(feed, self._twins, self._hypotheses, repeat(second)))  # waits for all, and raises what one raised
         innovations = [twin.take_innovations() for twin in self._twins]
         if self._twins[0].doubts > doubts or math.isnan(self._twins[0].evidence):
-            self._recent.clear()  # it has half forgotten zeros and load; any other would gain by what it still knows
+            self._maker.recent.clear()  # it has half forgotten zeros and load; any other would gain by what it still knows
             self._begin()
             return leaks
         return [*leaks, *self._decided(second.stamp, innovations)]
-
-    def _is_newly_left_out(self, flags: tuple[Flags, Flags]) -> bool:
-        """Return True if a sensor fails that no recent second leaves out."""
-        before = [each.left_out for each in self._recent if each.left_out is not None]
-        return bool(before) and any((now & ~np.any(then, axis=0)).any() for now, *then in zip(flags, *before, strict=True))
 
     def _decided(self, stamp: int, innovations: Sequence[Innovations]) -> list[Alarm]:
         """Return the alarms of named faults that begin or end with the evidence of a second."""
@@ -206,7 +177,7 @@ class FaultSearch:
 
         The twins have settled on the recent seconds, and the evidence of faults that there is still counts.
         """
-        self._expects *= QUIET
+        self._maker.expects *= QUIET
         faults, decision, age = self._faults, self._decision, self._age
         self._begin()
         if faults == self._faults:
@@ -265,13 +236,13 @@ class FaultSearch:
     def _may_leak(self, fault: Fault, age: int) -> bool:
         """Return True if an apparent softer spring of this `age` (ns) may be a leak, or a stroke transducer that is off.
 
-        A leak would show within `SPAN`. A named sensor fault of the joint may be one of its stroke transducer.
+        A leak would show within `CREEP_SPAN`. A named sensor fault of the joint may be one of its stroke transducer.
         """
         if not fault.cause.startswith("cylinder_"):
             return False
         number = int(fault.channel.removeprefix("cylinder_"))
         is_off = any(each.cause == f"joint_{number}.sensor" for each in self._named)
-        return is_off or number - 1 in self._creep.creeping or age < SPAN * SECOND
+        return is_off or number - 1 in self._creep.creeping or age < CREEP_SPAN * SECOND
 
     def _changed_size(self, named: Fault, change: Fault, spread: float, onset: int) -> list[Alarm]:
         """Change the size of a named fault; if the rest is that of a healthy boom, end the fault and return its alarm."""
@@ -318,17 +289,12 @@ class FaultSearch:
             return None
         spread = math.hypot(found.spread, usual)
         is_known = abs(found.size) > self._certain * spread and found.agreement > math.sqrt(2.0 * sure)
-        begun = [second.stamp for second in self._recent][-self._age :][found.onset]
+        begun = [second.stamp for second in self._maker.recent][-self._age :][found.onset]
         return (fault._replace(size=found.size), spread, begun, found.probability) if is_known else None
 
     def _course(self, fault: Fault) -> Array:
-        """Return the log likelihood of each second that counts as evidence; `IMPOSSIBLE` for an impossible boom."""
-        totals = [0.0]
-        try:
-            totals += [twin.evidence for _, twin in self._repeated(fault)]
-        except BoomTwinError:
-            return np.full(min(self._age, len(self._recent)), IMPOSSIBLE)
-        return np.nan_to_num(np.diff(totals)[-self._age :], nan=IMPOSSIBLE)
+        """Return the log likelihood of each second that counts as evidence, with a fault beside the named ones."""
+        return self._maker.course((*self._named, fault), self._age)
 
     def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float, float]:
         """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), the standard deviation, the drift.
@@ -337,7 +303,7 @@ class FaultSearch:
         the newest `DELAY`. A zero that still drifts will have changed by as much again when the verdict comes.
         """
         doubted, before = hypothesis(self._scene, (fault,)).doubted, tuple(np.zeros((3, 1)))
-        zeros = [(stamp, twin.zeros(doubted)) for stamp, twin in self._repeated(fault)]
+        zeros = [(stamp, twin.zeros(doubted)) for stamp, twin in self._maker.repeated((*self._named, fault))]
         now = zeros[-1][1]
         drift = now[0] - zeros[-1 - min(DELAY, len(zeros) - 1)][1][0]
         if fault.channel.startswith("joint_"):
@@ -348,16 +314,3 @@ class FaultSearch:
         axis = int(np.argmax(np.abs(change) / spread))
         self._zeros_before[fault.cause] = axis, float(before[0][axis])
         return fault._replace(size=float(change[axis])), float(spread[axis]), float(drift[axis])
-
-    def _repeated(self, fault: Fault) -> Iterator[tuple[int, Follower]]:
-        """Run a twin with a fault over the recent seconds; yield each stamp with the twin after that second."""
-        each, twin = self._made((*self._named, fault))
-        for second in self._recent:
-            _feed(twin, each, second)
-            yield second.stamp, twin
-
-
-def _feed(twin: Follower, each: Hypothesis, second: Second) -> None:
-    if second.left_out is not None:
-        twin.leave_out(*second.left_out)
-    twin.take(each.in_time(second.block))

@@ -20,8 +20,8 @@ from ..system.child_call import ChildCall, ChildEndedError
 from ..system.processes import usable_cores
 from ..types import SECOND, Alarm, Change, StrokeReading
 from .causes import MEMORY
-from .fault_search import DELAY, FaultSearch, Second
-from .faults import Follower, Hypothesis
+from .fault_search import DELAY, FaultSearch
+from .faults import Follower, Hypothesis, Second
 from .sensor_check import Flags
 
 SPACING = 18_000_000  # ns, least time between samples of a stream: 50 Hz suffice for all motion of the boom

@@ -1,9 +1,10 @@
-"""Faults of a boom, hypotheses (booms with faults), and the figures that an alarm states about a fault."""
+"""Faults of a boom, hypotheses (booms with faults), their twins, and the figures that an alarm states about a fault."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
@@ -12,6 +13,7 @@ import numpy as np
 from ..deviation.kalman import ANGLE_ZERO
 from ..deviation.sensor_errors import LAG_FLOOR
 from ..deviation.states import Innovations
+from ..errors import BoomTwinError
 from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
 from ..scene.summary import explain
@@ -21,6 +23,8 @@ from .sensor_check import Flags
 
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
 LATE = 0.02  # s, delay of the stamps of a stream
+IMPOSSIBLE = -1e9  # log likelihood of a boom whose twin fails
+WARM_UP = 10  # s of recent samples that new twins take first: they know neither motion nor zeros when they start
 QUIET = 0.1  # unknown force that the filter of a boom under less load expects, over the set one
 
 
@@ -158,6 +162,90 @@ def hypothesis(scene: Scene, faults: Sequence[Fault]) -> Hypothesis:
         else:
             extra[cause] += size if kind == "more" else -size
     return Hypothesis(scene, extra["tip.payload"], extra["line_fill"], frozenset(doubted), tuple(delays), expects)
+
+
+class Second(NamedTuple):
+    """Samples of a second that begins at `stamp` (ns), and the failing channels to leave out; or a change."""
+
+    stamp: int
+    block: Any = None
+    left_out: tuple[Flags, Flags] | None = None
+    change: Change | None = None
+
+
+def feed(twin: Follower, each: Hypothesis, second: Second) -> None:
+    """Let the twin of a hypothesis take a second."""
+    if second.left_out is not None:
+        twin.leave_out(*second.left_out)
+    twin.take(each.in_time(second.block))
+
+
+class TwinMaker:
+    """Maker of twins of a boom with faults. It keeps the `memory` newest seconds, which each new twin may take.
+
+    Attributes
+    ----------
+    recent : deque of Second
+        Newest seconds.
+    expects : float
+        Unknown force that the filters expect, over the set one.
+    """
+
+    def __init__(self, scene: Scene, make: Callable[[Hypothesis], Follower], memory: int) -> None:
+        self._scene, self._make = scene, make
+        self.recent: deque[Second] = deque(maxlen=memory)
+        self.expects = 1.0
+        self._change: Change | None = None
+
+    def restart(self, change: Change) -> None:
+        """Discard the recent seconds; further twins begin with a change."""
+        self.recent.clear()
+        self._change = change
+
+    def is_news(self, flags: tuple[Flags, Flags]) -> bool:
+        """Return True if the flags have a failing sensor that no recent second leaves out."""
+        before = [each.left_out for each in self.recent if each.left_out is not None]
+        return bool(before) and any((now & ~np.any(then, axis=0)).any() for now, *then in zip(flags, *before, strict=True))
+
+    def leave_out(self, flags: tuple[Flags, Flags]) -> None:
+        """Leave out failing sensors in all recent seconds."""
+        self.recent = deque((each._replace(left_out=flags) for each in self.recent), self.recent.maxlen)
+
+    def twin(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower]:
+        """Return the hypothesis of these faults, and its twin before any sample."""
+        each = hypothesis(self._scene, faults)
+        each = each._replace(expects=self.expects * each.expects)
+        twin = self._make(each)
+        if self._change is not None:
+            twin.requests.repeat(each.changed(self._change))
+        return each, twin
+
+    def warm(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower] | None:
+        """Return the hypothesis of these faults, and its twin after the newest seconds; None for an impossible boom."""
+        try:
+            each, twin = self.twin(faults)
+            for second in list(self.recent)[-WARM_UP:]:
+                feed(twin, each, second)
+            twin.take_innovations()
+        except BoomTwinError:  # such as one with a part too soft to hold it
+            return None
+        return each, twin
+
+    def repeated(self, faults: Sequence[Fault]) -> Iterator[tuple[int, Follower]]:
+        """Run a twin with these faults over the recent seconds; yield each stamp with the twin after that second."""
+        each, twin = self.twin(faults)
+        for second in self.recent:
+            feed(twin, each, second)
+            yield second.stamp, twin
+
+    def course(self, faults: Sequence[Fault], count: int) -> Array:
+        """Return the log likelihood of each of the `count` newest seconds; `IMPOSSIBLE` for an impossible boom."""
+        totals = [0.0]
+        try:
+            totals += [twin.evidence for _, twin in self.repeated(faults)]
+        except BoomTwinError:
+            return np.full(min(count, len(self.recent)), IMPOSSIBLE)
+        return np.nan_to_num(np.diff(totals)[-count:], nan=IMPOSSIBLE)
 
 
 def possible_faults(scene: Scene, reads: StrokeReading, streams: Collection[Stream]) -> list[Fault]:

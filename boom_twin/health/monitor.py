@@ -13,13 +13,12 @@ from ..scene.edit import loaded
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, SENSORS, Alarm, Array, Channel, Health, Mount, Place, Stream, StrokeReading
 from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows
-from .deviations import SIGMAS, DeviationMonitor
+from .deviations import SIGMAS, DeviationMonitor, TipLoadMonitor
 from .fault_twins import FaultTwins
 from .faults import Fault, explains, hypothesis
 from .lag_monitor import LagMonitor
 from .sensor_check import NOISE_OVER, Readings, SensorCheck, StreamReadings, sensor_ranges
 from .sensor_monitor import SensorMonitor
-from .tip_load import TipLoadMonitor
 from .wiring_monitor import WiringMonitor
 
 PERIOD = SECOND  # ns between two `Health` without news

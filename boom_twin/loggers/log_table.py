@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BagError, UsageError
-from ..system.received_files import open_received
+from ..system.files import open_received
 from ..types import Array
 from .csv_layout import BLANKS, THOUSANDS, CsvLayout, layout_of, split_header, unit_of
 

@@ -17,12 +17,11 @@ from ..twin.sample_check import merged
 from ..twin.twin import Twin
 from ..types import Report, Sample
 from . import ACTS, PORT
-from .access_control import AccessControl
 from .data.bag_feed import TwinView
 from .data.feed import Feed
 from .data.status import Severity, text
 from .data.store import Store
-from .server import Server, serving
+from .server import AccessControl, Server, serving
 from .viewer import ViewerActions
 
 

@@ -16,7 +16,7 @@ from ..bag.session_file import WHOLE, TimeWindow
 from ..errors import BagError
 from ..messages.sample_decoder import stamp_of
 from ..messages.topic_table import Topics
-from ..system.received_files import holds_file, open_received
+from ..system.files import holds_file, open_received
 from ..twin.blocks import EstimateBlock, PredictionBlock
 from ..types import NANO, Array
 from .session_samples import topics_read

@@ -17,7 +17,7 @@ from ..config.settings import Settings
 from ..health.alarms import Alarms, evidence_with_cause
 from ..health.sensor_monitor import noise_as_text
 from ..predictions import Clock
-from ..system.received_files import sha256_of
+from ..system.files import sha256_of
 from ..twin.blocks import CODES, STREAMS, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined
 from ..types import NANO, SENSORS, USUAL_STREAMS, Alarm, Array, Health, Stream, StrokeReading, channels_of
 from .ground_truth import TipErrors

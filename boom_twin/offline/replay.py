@@ -23,7 +23,7 @@ from ..errors import BagError
 from ..health.sensor_check import sensor_ranges
 from ..messages.sample_decoder import ODDITIES
 from ..scene.load import SceneSource
-from ..system.atomic_files import write_atomic
+from ..system.files import write_atomic
 from ..system.processes import quick_switches
 from ..system.result_folder import REPLAY, result_folder
 from ..system.result_text import SummaryDisplay, data_frame

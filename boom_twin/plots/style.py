@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
-from ..system.atomic_files import write_atomic
+from ..system.files import write_atomic
 from ..system.terminal_text import printable
 from ..types import Array
 

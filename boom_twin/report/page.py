@@ -13,13 +13,13 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from .. import __version__
-from ..analysis.free_vibration import Vibration
+from ..analysis.sample_series import Vibration
 from ..offline.history import course
 from ..offline.recording import Recording, noise_told
 from ..plots import AlarmSpan
 from ..plots.results import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import DEPTH_BY_GYRATION
-from ..system.atomic_files import write_atomic
+from ..system.files import write_atomic
 from ..texts import alarm_sentence
 from ..twin.blocks import event_meaning
 from ..types import SECOND, SENSORS, Stream

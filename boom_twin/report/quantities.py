@@ -22,8 +22,7 @@ from ..errors import BagError, UsageError
 from ..offline.recording import alarm_as_text
 from ..plots import History
 from ..scene.schema import Scene
-from ..system.atomic_files import write_atomic
-from ..system.received_files import holds_file, open_received, sha256_of
+from ..system.files import holds_file, open_received, sha256_of, write_atomic
 from ..types import Array, Stream, sensor_kind, stream_of
 from .vibration import RestPeriod
 

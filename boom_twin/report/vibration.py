@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.free_vibration import ORDER, Vibration, free_vibrations, is_free
 from ..analysis.posture_modes import ModeList
-from ..analysis.sample_series import spacing, unbroken
+from ..analysis.sample_series import ORDER, Vibration, free_vibrations, is_free, spacing, unbroken
 from ..plots import History
 from ..scene.schema import Scene
 from ..scene.summary import weight_of

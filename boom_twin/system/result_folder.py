@@ -20,8 +20,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ..errors import BagError
-from .atomic_files import sync_folder, write_atomic
-from .received_files import real_path, sha256_of
+from .files import real_path, sha256_of, sync_folder, write_atomic
 
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
 BUILDING, REPLACED = ".unfinished", ".replaced"  # suffixes of the folders beside the result

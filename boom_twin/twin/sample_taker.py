@@ -40,9 +40,8 @@ from ..types import (
 from .adjustments import Requests, ResidualBuffer, SensorZeros, limits_of
 from .block_update import BlockUpdate
 from .blocks import CODES, REGULAR, Note, ReportBlock, SampleBlock
-from .run import Run
+from .run import Run, StampCheck, verdict_on
 from .sample_check import SampleCheck
-from .stamp_check import StampCheck, verdict_on
 from .state import (
     FOLLOWER_ROOM,
     NEWEST,

@@ -1,7 +1,7 @@
 """State of the twin as arrays (stamps, expected readings, waiting samples, zeros), and the rules of a regular sample by it.
 
-The compiled update applies the rules to every sample. `boom_twin.twin.stamp_check` and `boom_twin.twin.run` apply them to
-irregular samples, as Python.
+The compiled update applies the rules to every sample. `boom_twin.twin.run` applies them to irregular samples, as
+Python.
 """
 
 from __future__ import annotations

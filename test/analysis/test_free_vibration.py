@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.analysis.free_vibration import Vibration, free_vibrations
+from boom_twin.analysis.sample_series import Vibration, free_vibrations
 
 DT, FREQUENCIES, DAMPINGS = 0.025, np.array([0.986, 2.64, 5.38]), np.array([0.008, 0.012, 0.02])
 SHAPES = np.array([[1.0, 0.4], [0.5, -0.8], [0.3, 0.2]])

@@ -18,7 +18,7 @@ from recordings import TRUTH, load_truth, mapping_of, recover, scan
 from boom_twin import BagError
 from boom_twin.report.quantities import FILE_NAME as QUANTITIES
 from boom_twin.report.quantities import read, side_of
-from boom_twin.system.received_files import open_received
+from boom_twin.system.files import open_received
 
 MCAP, METADATA, SESSION_YAML, SUMMARY = "session_0.mcap", "metadata.yaml", "session.yaml", "summary.json"
 LINK = "a symbolic link"
@@ -104,7 +104,7 @@ def test_what_the_user_names_may_be_a_link(bag: Path, tmp_path: Path) -> None:
 def test_a_file_that_is_exchanged_for_a_link_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "secret").write_bytes(b"abc")
     (tmp_path / "a").symlink_to(tmp_path / "secret")
-    monkeypatch.setattr("boom_twin.system.received_files.holds_file", lambda path: True)  # as it was when it was looked at
+    monkeypatch.setattr("boom_twin.system.files.holds_file", lambda path: True)  # as it was when it was looked at
     with pytest.raises(OSError, match="symbolic links"):
         open_received(tmp_path / "a")
 

@@ -28,7 +28,7 @@ from drive_twin import PUMP_DRIVES
 
 from boom_twin.offline.ground_truth import load_truth
 from boom_twin.offline.replay import Replay
-from boom_twin.system.atomic_files import write_atomic
+from boom_twin.system.files import write_atomic
 from boom_twin.validation.study.report import machine
 
 DOCS = ROOT / "docs"

@@ -23,10 +23,9 @@ from playwright.sync_api import sync_playwright
 from record import keep
 
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.monitor.access_control import AccessControl
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
-from boom_twin.monitor.server import Server
+from boom_twin.monitor.server import AccessControl, Server
 from boom_twin.monitor.viewer import ViewerActions
 
 RATE = 200

@@ -12,7 +12,7 @@ from recordings import write_session
 
 from boom_twin import Scene
 from boom_twin.validation import rig
-from boom_twin.validation.rig.loads import parse, tip_load
+from boom_twin.validation.rig.motion import parse_load, tip_load
 
 ENCODERS = np.radians([0.1, -0.1, 0.1, -0.1])
 
@@ -38,7 +38,7 @@ class Made(NamedTuple):
 def made(truth: Scene, posture: str, duration: float, seed: int, loads: tuple[str, ...] = ()) -> Made:
     """Random moves; steps of 1 ms and 12 elements a section leave less error than the sensors' noise."""
     programme = rig.random_programme(truth, posture, duration, seed)
-    pushes = tip_load(truth, [parse(load) for load in loads], duration, seed) if loads else None
+    pushes = tip_load(truth, [parse_load(load) for load in loads], duration, seed) if loads else None
     return Made(truth, programme, rig.simulate(truth, programme, duration, 1e-3, 2e-3, 12, pushes))
 
 

@@ -26,8 +26,7 @@ from boom_twin.offline.progress import ProgressLine
 from boom_twin.offline.recording import Stretch
 from boom_twin.report.evaluation import evaluated_replay
 from boom_twin.ros.startup import require_rclpy
-from boom_twin.system.atomic_files import write_atomic
-from boom_twin.system.received_files import holds_file, open_received
+from boom_twin.system.files import holds_file, open_received, write_atomic
 from boom_twin.system.result_folder import REPLAY, result_folder
 from boom_twin.types import NANO, sensor_kind
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
-from boom_twin.health.tip_load import TipLoadMonitor
+from boom_twin.health.deviations import TipLoadMonitor
 from boom_twin.types import Alarm
 
 STEP, ONSET, END = 5_000_000, 600, 1800  # ns; samples

@@ -14,7 +14,7 @@ import pytest
 from aiohttp import ClientSession, WSMsgType
 from monitor.conftest import MonitorProcess, monitoring
 
-from boom_twin.monitor.access_control import POLICY
+from boom_twin.monitor.server import POLICY
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 PATIENCE = 240.0

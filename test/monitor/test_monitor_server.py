@@ -18,10 +18,9 @@ from monitor.test_monitor_lamps import ERROR, OK, status
 from ros_messages import load_topics
 
 from boom_twin import load_scene
-from boom_twin.monitor.access_control import AccessControl
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
-from boom_twin.monitor.server import Server
+from boom_twin.monitor.server import AccessControl, Server
 from boom_twin.monitor.viewer import ViewerActions
 
 Talk = Callable[[ClientSession, str], Awaitable[None]]

@@ -14,7 +14,8 @@ from ros_messages import every_input, jazzy
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.bag.session_writer import named_message
 from boom_twin.types import SECOND, Place
-from boom_twin.validation.rig import loads, random_programme, record
+from boom_twin.validation.rig import random_programme, record
+from boom_twin.validation.rig.motion import parse_load, tip_load
 from boom_twin.validation.rig.session import RigSession
 
 SCENE = load_scene()
@@ -34,8 +35,8 @@ def motion(seed: int, is_pumped: bool, duration: float) -> RigSession:
     """Random moves, beside a pump and wind if asked for."""
     posture = sorted(SCENE.postures)[seed % len(SCENE.postures)]
     programme = random_programme(SCENE, posture, duration, seed)
-    pushing = [loads.parse("pump:0.43:130:0.1@5"), loads.parse("wind:15:5")] if is_pumped else []
-    load = loads.tip_load(SCENE, pushing, duration, seed) if pushing else None
+    pushing = [parse_load("pump:0.43:130:0.1@5"), parse_load("wind:15:5")] if is_pumped else []
+    load = tip_load(SCENE, pushing, duration, seed) if pushing else None
     return record(SCENE, programme, duration, seed=seed, load=load, places={"imu_2": PLACE}, cylinders=SIZES)
 
 

@@ -17,7 +17,7 @@ import pytest
 from recordings import incompleteness
 
 from boom_twin import BagError
-from boom_twin.system.atomic_files import write_atomic
+from boom_twin.system.files import write_atomic
 from boom_twin.system.result_folder import RECOVER, REPLAY, RIG, ResultKind, result_folder
 
 FILES = ("summary.json", "quantities.json", "bag/session_0.mcap")

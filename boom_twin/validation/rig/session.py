@@ -20,7 +20,7 @@ from scipy.interpolate import CubicSpline
 from ...errors import UsageError
 from ...scene.kinematics import gravity_in_base
 from ...scene.schema import Scene
-from ...system.atomic_files import write_atomic
+from ...system.files import write_atomic
 from ...types import NO_PLACES, SECOND, Array, Place, Stream
 from .solve import Change, Drive, TipLoad, simulate
 from .system import Site

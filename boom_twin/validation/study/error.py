@@ -13,9 +13,9 @@ from typing import Any
 
 from ...analysis.methods import DURATION, motion_of
 from ...offline.progress import ProgressLine
-from ...plots.study import Curve, Panel, error_picture
+from ...plots.analysis import Curve, Panel, error_picture
 from ...scene.schema import Scene
-from ...system.atomic_files import write_atomic
+from ...system.files import write_atomic
 from .error_runs import PAPERS, Case, Own, Peer, Problem, Row, Runner, build, own_cases, peer_cases, pose
 from .report import page, table, write_json
 

@@ -13,7 +13,7 @@ from ...errors import SolverError
 from ...reduction.deviation import FREQUENCIES, Response, StrokeCourse, answer, course_of, deviation, step_times, unknowns
 from ...reduction.search import Variant, variants
 from ...scene.schema import Scene
-from ...system.atomic_files import write_atomic
+from ...system.files import write_atomic
 from .report import page, table, write_json
 
 HEAD = ("variant", "at rest, mm", "moving, mm", "f1, %", "time saved, %")

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from ...system.atomic_files import write_atomic
+from ...system.files import write_atomic
 from ...system.processes import usable_cores
 from ...system.result_text import json_text
 

@@ -1,4 +1,4 @@
-"""Study of stability (`boom_twin study stability`): every case by every method, and the report."""
+"""Study of stability (`boom_twin study stability`): every case by every method, measured deviations, the report."""
 
 from __future__ import annotations
 
@@ -11,30 +11,124 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...analysis.equilibrium import rest_at
-from ...analysis.methods import Method, MethodRun, integrate_with
+from ...analysis.methods import Method, MethodRun
 from ...errors import SolverError
 from ...scene.kinematics import joint_angles_of_strokes, section_angles
 from ...scene.schema import Scene
-from ...system.atomic_files import write_atomic
+from ...system.files import write_atomic
+from ...types import Array
 from .report import page, table, write_json
-from .stability_cases import Case, Setup, cases, move_in_words
-from .stability_verdict import BOUNDS, Facts, against_motion, against_rest
+from .stability_cases import BOUNDS, METHODS, Case, Facts, Setup, cases, move_in_words
 
-METHODS: dict[str, Method] = {
-    "default": Method(),
-    "rho 1": Method(parameter=1.0),
-    "rho 0.5": Method(parameter=0.5),
-    "rho 0": Method(parameter=0.0),
-    "Newmark 0.5": Method("newmark", 0.5),
-    "Newmark 0.6": Method("newmark", 0.6),
-    "Wilson 1.4": Method("wilson", 1.4),
-    "Houbolt": Method("houbolt"),
-    "Park": Method("park"),
-    "single pass": Method(passes=1),
-    "plain product": Method(product="plain"),
-}
+Mask = NDArray[np.bool_]
+IMPULSE = 0.05  # s after a speed jump in which accelerations and forces are not compared
+TINY = 1e-12  # m/s^2 or N, least divisor
+
+
+def against_motion(found: MethodRun, right: MethodRun, still: float, jump: float = math.nan) -> Facts:
+    """Return the deviations from the reference motion `right` at the same rows; the drives hold from `still` (s) on.
+
+    Accelerations and forces are not compared just after a speed jump at time `jump` (s), because they are impulses there.
+    """
+    smooth = ~(np.abs(right.times - jump - 0.5 * IMPULSE) <= 0.5 * IMPULSE + 1e-9)
+    acceleration, force = right.tip_acceleration[smooth], right.cylinder_forces[smooth]
+    ringing = _rings(found, right, (right.times > still) & smooth)
+    return Facts(
+        found.status,
+        doubt=found.doubt,
+        error=_largest(found.tip - right.tip) / _path(right),
+        acceleration=_rms(found.tip_acceleration[smooth] - acceleration) / max(_rms(acceleration), TINY),
+        force=_rms(found.cylinder_forces[smooth] - force) / max(_largest(force), TINY),
+        ringing=ringing[0],
+        force_ringing=ringing[1],
+        growth=growth(found, still) / max(growth(right, still), 1e-3),
+        lasting=_lasting(found, right, jump, _largest(force)),
+        passes=found.passes,
+    )
+
+
+def _lasting(found: MethodRun, right: MethodRun, jump: float, largest: float) -> float:
+    """Return the rows from a speed jump to the last cylinder force wrong by 5 % of the largest; NaN without a jump."""
+    if math.isnan(jump):
+        return math.nan
+    wrong = np.linalg.norm(found.cylinder_forces - right.cylinder_forces, axis=1) > 0.05 * largest
+    late = right.times[wrong & (right.times >= jump - 1e-9)]
+    return float((late.max() - jump) / right.times[1]) if late.size else 0.0
+
+
+def against_rest(found: MethodRun, equilibrium: Array | None, still: float) -> Facts:
+    """Return the deviations at the end of a long hold from the tip's `equilibrium` (m), shape (2,).
+
+    If that is None, drift is the shift of the mean over the hold.
+    """
+    late = np.flatnonzero(found.times > still)
+    first, last = late[: len(late) // 4], late[-(len(late) // 4) :]
+    away = found.tip[-1] - equilibrium if equilibrium is not None else found.tip[last].mean(0) - found.tip[first].mean(0)
+    ringing = _rings(found, None, found.times > still)
+    return Facts(
+        found.status,
+        doubt=found.doubt,
+        drift=float(np.linalg.norm(away)) / _path(found),
+        ringing=ringing[0],
+        force_ringing=ringing[1],
+        growth=growth(found, still),
+        passes=found.passes,
+    )
+
+
+def growth(motion: MethodRun, still: float) -> float:
+    """Return the ratio of tip acceleration vibration in the last quarter of the hold to the first.
+
+    It is 1 for a boom that is still: below a thousandth of the largest acceleration.
+    """
+    late = np.flatnonzero(motion.times > still)
+    quarter = max(len(late) // 4, 1)
+    first, last = (motion.tip_acceleration[rows] for rows in (late[:quarter], late[-quarter:]))
+    before, after = (_rms(values - values.mean(0)) for values in (first, last))
+    if after <= 1e-3 * _largest(motion.tip_acceleration):
+        return 1.0
+    return after / before if before > 0.0 else math.inf
+
+
+def alternating(values: Array) -> Array:
+    """Return the row-to-row alternating part of `values` (m, c), shape (m - 2, c); nearly zero for a smooth curve."""
+    return np.asarray(0.25 * (2.0 * values[1:-1] - values[2:] - values[:-2]))
+
+
+def _rings(found: MethodRun, right: MethodRun | None, late: Mask) -> tuple[float, float]:
+    """Return the ringing of tip acceleration and cylinder forces in rows `late`, after subtraction of the reference."""
+
+    def ring(own: Array, other: Array | None) -> float:
+        more = own if other is None else own - other
+        return _rms(alternating(more[late])) / max(_largest(own if other is None else other), TINY)
+
+    return (
+        ring(found.tip_acceleration, None if right is None else right.tip_acceleration),
+        ring(found.cylinder_forces, None if right is None else right.cylinder_forces),
+    )
+
+
+def _rms(values: Array) -> float:
+    """Return the rms norm of the rows (m, c); infinite if any value is not finite, 0 without rows."""
+    if not values.size:
+        return 0.0
+    return float(np.sqrt(np.mean(np.sum(values**2, axis=-1)))) if np.isfinite(values).all() else math.inf
+
+
+def _path(motion: MethodRun) -> float:
+    """Return the largest distance of the tip from its start, m."""
+    return max(_largest(motion.tip - motion.tip[0]), 1e-9)
+
+
+def _largest(values: Array) -> float:
+    """Return the largest norm of the rows; infinite if any value is not finite."""
+    sizes = np.linalg.norm(values, axis=-1)
+    return float(sizes.max()) if np.isfinite(sizes).all() else math.inf
+
+
 NOTHING = "there is no solution"
 
 
@@ -67,7 +161,7 @@ def one(case: Case, methods: dict[str, Method]) -> CaseResult:
 
     def cell(method: Method) -> Facts:
         try:
-            return judge(_march(setup, setup.step, 1, method))
+            return judge(setup.march(setup.step, 1, method))
         except SolverError as error:
             return Facts(str(error), solvable=case.truth != "none")
 
@@ -88,7 +182,7 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]
     if case.truth == "fine steps":
         step = max(setup.step / 8, 5e-6)  # s; in shorter steps round-off prevails
         every, stride = max(round(setup.step / step), 1), max(round(step / setup.step), 1)
-        right = _march(setup, step, every, Method(tolerance=1e-10))
+        right = setup.march(step, every, Method(tolerance=1e-10))
         if right.status != "ok":
             return unsolvable, f"{NOTHING}: the reference ended, {right.status}"
         told = f"default method at {step:.3g} s"
@@ -100,10 +194,6 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]
         rest = rest_at(setup.scene, last, angles)[1].frames[-1, :2].copy()
     told = "equilibrium of the last strokes" if rest is not None else "a vibration that does not grow about a mean that stays"
     return lambda found: ended(found) or against_rest(found, rest, setup.still), told
-
-
-def _march(setup: Setup, step: float, every: int, method: Method) -> MethodRun:
-    return integrate_with(setup.scene, setup.drive, setup.duration, step, every, method, angles=setup.angles)
 
 
 def _thinned(motion: MethodRun, stride: int) -> MethodRun:

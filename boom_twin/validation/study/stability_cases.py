@@ -1,4 +1,4 @@
-"""Cases of the stability study: scenes, motions and steps, what is varied, what is right."""
+"""Definition of the stability study: its methods, its cases (scenes, motions, steps), and the bounds of a verdict."""
 
 from __future__ import annotations
 
@@ -10,13 +10,27 @@ from typing import Literal
 
 import numpy as np
 
-from ...analysis.methods import Drive, Motion, motion_of
+from ...analysis.methods import Drive, Method, MethodRun, Motion, integrate_with, motion_of
 from ...scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
 from ...scene.load import load_scene
 from ...scene.pump_pulses import ease
 from ...scene.schema import Scene
 from ...types import Array
 from . import scenes as made
+
+METHODS: dict[str, Method] = {
+    "default": Method(),
+    "rho 1": Method(parameter=1.0),
+    "rho 0.5": Method(parameter=0.5),
+    "rho 0": Method(parameter=0.0),
+    "Newmark 0.5": Method("newmark", 0.5),
+    "Newmark 0.6": Method("newmark", 0.6),
+    "Wilson 1.4": Method("wilson", 1.4),
+    "Houbolt": Method("houbolt"),
+    "Park": Method("park"),
+    "single pass": Method(passes=1),
+    "plain product": Method(product="plain"),
+}
 
 FULL_STROKE = 10.0  # s, duration of a full stroke at full speed
 
@@ -32,6 +46,10 @@ class Setup:
     step: float
     still: float  # time (s) after which the drives stand still
     jump: float = math.nan  # time (s) of a jump in speed, or NaN; accelerations and forces are impulses there, without a value
+
+    def march(self, step: float, every: int, method: Method) -> MethodRun:
+        """Integrate the motion by a method with this `step` (s); keep each row that is a multiple of `every`."""
+        return integrate_with(self.scene, self.drive, self.duration, step, every, method, angles=self.angles)
 
 
 @dataclass(frozen=True)
@@ -245,3 +263,71 @@ def _payload_and_modes(scene: Scene) -> Iterator[Case]:
     for count in (1, 2, 4, 6, 8, 10):
         make = partial(smooth, made.with_modes(scene, count))
         yield Case("modes", f"{count} a part", "bending coordinates", make, quick=count == 10)
+
+
+Word = Literal["holds", "degrades", "fails", "refuses"]
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Deviations of a motion from its reference. A quantity that does not apply to the case is NaN."""
+
+    status: str  # "ok", or the reason for an early end of the motion
+    solvable: bool = True  # True if a solution exists
+    doubt: str = ""  # warning of the simulation, see `analysis.doubts`
+    error: float = math.nan  # largest tip error, relative to the tip's path
+    acceleration: float = math.nan  # rms error of the tip acceleration, relative to its rms
+    force: float = math.nan  # rms error of the cylinder forces, relative to the largest
+    ringing: float = math.nan  # rms of what alternates from step to step while the drives hold, relative to the peak
+    force_ringing: float = math.nan  # likewise of the cylinder forces
+    growth: float = math.nan  # ratio of vibration in the last quarter of the hold to the first, relative to the reference's
+    drift: float = math.nan  # distance from equilibrium, or shift of the mean, after a long hold, over the path
+    lasting: float = math.nan  # steps after a speed jump until cylinder forces are correct again
+    passes: float = math.nan  # of Newton's method per step
+
+    @property
+    def verdict(self) -> CaseVerdict:
+        """Return the verdict by `BOUNDS`. Infinite values exceed every bound; NaN exceeds none."""
+        if self.status != "ok":
+            return CaseVerdict("fails" if self.solvable else "refuses", self.status)
+        warned = f" (it says: {self.doubt})" if self.doubt else ""
+        if not self.solvable:
+            return CaseVerdict("fails", "gives numbers where there is no solution" + warned, silent=not self.doubt)
+        failing, degrading = list[str](), list[str]()
+        for name, (degrades, fails, symptom) in BOUNDS.items():
+            value = getattr(self, name)
+            beyond = failing if value > fails or math.isinf(value) else degrading if value > degrades else None
+            if beyond is not None:
+                beyond.append(symptom.format(f"{float(f'{value:.2g}'):g}"))
+        if not failing and not degrading:
+            return CaseVerdict("holds", "")
+        return CaseVerdict(
+            "fails" if failing else "degrades", "; ".join(failing + degrading) + warned, bool(failing) and not self.doubt
+        )
+
+
+@dataclass(frozen=True)
+class CaseVerdict:
+    """Verdict with its symptom. `silent` is True if the numbers are wrong without a bad status or a warning."""
+
+    word: Word
+    symptom: str
+    silent: bool = False
+
+    @property
+    def mark(self) -> str:
+        return "silent" if self.silent else self.word
+
+
+# quantity: (degrades above, fails above, symptom)
+BOUNDS: dict[str, tuple[float, float, str]] = {
+    "error": (1e-2, 1e-1, "tip wrong by {} of its path"),
+    "acceleration": (5e-2, 1.0, "tip acceleration wrong by {} of its rms"),
+    "force": (1e-2, 1e-1, "cylinder forces wrong by {} of the largest"),
+    "drift": (1e-4, 1e-2, "tip drifts by {} of its path"),
+    "growth": (1.2, 3.0, "vibration grows {}-fold while the drives hold"),
+    "ringing": (2e-2, 0.5, "tip acceleration rings from step to step, {} of its peak"),
+    "force_ringing": (2e-2, 0.5, "cylinder forces ring from step to step, {} of their peak"),
+    "lasting": (10.0, math.inf, "cylinder forces are wrong for {} steps after the jump of speed"),
+    "passes": (6.0, math.inf, "slow Newton: {} passes a step"),
+}

@@ -40,9 +40,9 @@ from boom_twin.health.alarms import Alarms
 from boom_twin.scene.pump_pulses import ease
 from boom_twin.twin.blocks import SampleBlock, block_of
 from boom_twin.types import NANO, SECOND, Array, Stream
-from boom_twin.validation.rig import Scheme, Sensors, at_rest, loads, move, observe, random_programme
+from boom_twin.validation.rig import Scheme, Sensors, at_rest, move, observe, random_programme
 from boom_twin.validation.rig.faults import RigFault, changes, parse, spoil, wrong_by
-from boom_twin.validation.rig.motion import Programme
+from boom_twin.validation.rig.motion import Programme, PumpLoad, WindLoad, parse_load, tip_load
 
 ELEMENTS, STEP, RECORDED, SCHEME = 6, 2.5e-3, 5e-3, Scheme(tolerance=1e-4)
 DURATION, LONG, FASTER = 60.0, 600.0, 2.0  # s; how much faster hasty moves are
@@ -89,8 +89,8 @@ def drawn(number: int, is_long: bool = False) -> dict[str, Any]:
     words = words.format(**sizes, a=a.format(**sizes), b=b.format(**sizes | {"i": j}))
     chances = (("tip_imu", 0.3, "EI|imu"), ("cylinder_forces", 0.4, "force"))
     without = [name for name, chance, needed in chances if rng.random() < chance and not re.search(needed, words)]
-    pump = loads.PumpLoad(rng.uniform(0.2, 0.6), math.exp(rng.uniform(math.log(30.0), math.log(250.0))), onset=2.0)
-    wind, kind = loads.WindLoad(rng.uniform(10.0, 40.0)), str(rng.choice(LOADS[3:] if is_long else LOADS))
+    pump = PumpLoad(rng.uniform(0.2, 0.6), math.exp(rng.uniform(math.log(30.0), math.log(250.0))), onset=2.0)
+    wind, kind = WindLoad(rng.uniform(10.0, 40.0)), str(rng.choice(LOADS[3:] if is_long else LOADS))
     return row | {
         "faults": words.split(),
         "moves": str(rng.choice(MOVES[: 4 if is_long else 5])),
@@ -123,8 +123,8 @@ def session_of(row: dict[str, Any]) -> SampleBlock:
     ours = [each for each in row["faults"] if each.startswith("tip_imu.") or ".delay" in each]
     faults = [parse(each) for each in row["faults"] if each not in ours]
     boom, changing = changes(wrong_by(scene, 0.02, number) if row["is_wrong"] else scene, faults)
-    varying = loads.tip_load(boom, [loads.parse(each) for each in row["loads"]], duration, number)
-    mean = row["mean_wind"] * loads.WindLoad(1.0).direction(boom.base.inclination)
+    varying = tip_load(boom, [parse_load(each) for each in row["loads"]], duration, number)
+    mean = row["mean_wind"] * WindLoad(1.0).direction(boom.base.inclination)
 
     def load(times: Array) -> Array:
         return varying(times) + ease(times / 2.0)[:, None] * mean

@@ -8,7 +8,7 @@ import numpy as np
 
 from boom_twin import Scene
 from boom_twin.scene.schema import IDEAL_BELOW
-from boom_twin.system.atomic_files import write_atomic
+from boom_twin.system.files import write_atomic
 from boom_twin.validation.study.report import page, table
 
 from .pictures import RestOffsetCurve, Trace, sinking_picture, swing_picture

@@ -14,7 +14,7 @@ from boom_twin import Scene, simulate, statics
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.modal import natural_modes
 from boom_twin.compiler.compile import BasisName, compile_scene
-from boom_twin.system.atomic_files import write_atomic
+from boom_twin.system.files import write_atomic
 from boom_twin.validation.study.report import page, table
 
 from .let_go import undeflected

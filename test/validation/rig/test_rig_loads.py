@@ -13,8 +13,7 @@ from default_boom import strokes_of_posture, with_parameters
 
 from boom_twin import UsageError, load_scene, statics
 from boom_twin.validation.rig import Programme, simulate
-from boom_twin.validation.rig.loads import PumpLoad, WindLoad, check, parse, tip_load
-from boom_twin.validation.rig.motion import ease
+from boom_twin.validation.rig.motion import PumpLoad, WindLoad, check_loads, ease, parse_load, tip_load
 
 
 @pytest.mark.parametrize(
@@ -27,8 +26,8 @@ from boom_twin.validation.rig.motion import ease
     ],
 )
 def test_text_and_back(text, load):
-    assert parse(text) == load and str(load) == text
-    assert parse("pump:0.43:130") == PumpLoad(0.43, 130.0, 0.1, 0.0) and parse("wind:15") == WindLoad(15.0, 5.0, 0.0)
+    assert parse_load(text) == load and str(load) == text
+    assert parse_load("pump:0.43:130") == PumpLoad(0.43, 130.0, 0.1, 0.0) and parse_load("wind:15") == WindLoad(15.0, 5.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +41,7 @@ def test_text_and_back(text, load):
 )
 def test_refused(text, told):
     with pytest.raises(UsageError, match=told):
-        check([parse(text)], 20.0)
+        check_loads([parse_load(text)], 20.0)
 
 
 def test_pulses_are_on_for_half_of_each_period():
@@ -73,7 +72,7 @@ def test_wind_has_the_spectrum_of_von_karman():
 
 def test_wind_is_drawn_by_its_seed():
     scene, times = load_scene(), np.linspace(0.0, 20.0, 400)
-    loads = [parse("wind:15"), parse("wind:15")]
+    loads = [parse_load("wind:15"), parse_load("wind:15")]
     one, same, other = (tip_load(scene, loads[:1], 20.0, seed)(times) for seed in (3, 3, 4))
     assert np.array_equal(one, same) and np.abs(one - other).max() > 5.0 and not one[0].any()
     both = tip_load(scene, loads, 20.0, 3)(times)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from boom_twin import load_scene
-from boom_twin.validation.study.stability import METHODS, one, run
-from boom_twin.validation.study.stability_cases import cases
+from boom_twin.validation.study.stability import one, run
+from boom_twin.validation.study.stability_cases import METHODS, cases
 
 COARSE = {"dt 2e-2 s", "dt 5e-2 s", "dt 5e-2 s, fast"}
 QUICK = [case for case in cases(load_scene()) if case.quick]
