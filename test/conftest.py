@@ -22,7 +22,7 @@ from made_once import MadeOnce
 FIRST = (
     "health/test_health_twin", "oracle/test_segments", "oracle/test_twin_against_rig", "report/test_compare",
     "ros/test_ros_demo", "ros/test_ros_two_booms", "ros/test_ros_page_live", "ros/test_ros_recording",
-    "offline/test_replay_errors", "plots/test_replay_pictures", "validation/study/test_need",
+    "offline/test_replay_errors", "plots/test_pictures", "validation/study/test_need",
 )  # fmt: skip
 """Files that take longest: begun first, or one process is left with one of them when the others are done."""
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from analysis.resting import resting
 from oracle import booms
-from oracle.clearance import rigid
-from oracle.clearance.scenes import PINS, RADII, RODS, with_pins
+from oracle.clearance.scenes import PINS, RADII, RODS, rigid_document, with_pins
 from reference.contact_law import Contact, stiffness
 from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
@@ -32,7 +31,7 @@ def bush(pin, clearance):
 @pytest.mark.parametrize("posture, index", [*product(POSTURES, range(4))])
 def test_rigid_boom_rests_as_the_oracle_has_it(posture, index):
     """Tip, force and offset of a rod's pin in a boom with one oil spring."""
-    document, contact = rigid.document(4, index), bush(RODS[index], 1e-4)
+    document, contact = rigid_document(4, index), bush(RODS[index], 1e-4)
     headings, pin = np.radians(document["postures"][posture]), f"cylinder_{index + 1}.rod"
     found = resting(with_pins(document, [pin]), posture)
     drive = geometry.cylinder_length(document, headings, index)
@@ -61,7 +60,7 @@ CLEARANCE, STEP = 1e-4, 1e-9
 
 def undamped(index):
     """A rigid boom with the oil spring of cylinder `index` alone, without its damper."""
-    document = rigid.document(4, index)
+    document = rigid_document(4, index)
     del document["joints"][index]["cylinder"]["d"]
     return document
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from analysis.resting import at_rest
 from default_boom import strokes_of_angles
-from oracle import booms, segments
+from oracle import booms
+from reference.segments import equilibrium as segments
 from scipy.linalg import eigh, null_space
 
 from boom_twin import SolverError, load_scene, statics

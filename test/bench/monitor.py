@@ -1,4 +1,4 @@
-"""What the live page costs and how soon it shows: frames of one and of four pages, memory, delay, a thousand connections.
+"""What the live page costs and how soon it shows: frames, memory, delay.
 
 ``python test/bench/monitor.py [--seconds 120]`` needs Debian's chromium. The feed is made here, 200 rows a second stamped by
 this machine's clock, so the delay is from a row's stamp to its drawing, without node and DDS.
@@ -12,13 +12,12 @@ import sys
 import threading
 import time
 from argparse import ArgumentParser
-from concurrent.futures import ThreadPoolExecutor
 from math import sin
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-from aiohttp import ClientSession, web
+from aiohttp import web
 from playwright.sync_api import sync_playwright
 from record import keep
 
@@ -85,15 +84,6 @@ def watch(pages: list[Any], seconds: int) -> list[list[int]]:
     return [each[1:] for each in found]
 
 
-async def hostile(url: str) -> int:
-    """A thousand connections at once; how many were taken."""
-    headers = {"Origin": url.rstrip("/")}
-    async with ClientSession() as session:
-        tries = (session.ws_connect(f"{url}socket", headers=headers) for _ in range(1000))
-        opened = await asyncio.gather(*tries, return_exceptions=True)
-        return sum(not isinstance(each, BaseException) for each in opened)
-
-
 def heap(page: Any) -> float:
     """What the page's scripts hold once the rest is collected, MiB."""
     session = page.context.new_cdp_session(page)
@@ -118,20 +108,10 @@ def one_page(page: Any, seconds: int) -> bool:
     return median(found) >= 30 and heaps[-1] - heaps[0] <= LARGEST
 
 
-def four_pages(browser: Any, first: Any, url: str, seconds: int) -> None:
-    """Frames of each of four."""
-    others = [browser.new_page(viewport={"width": 1280, "height": 720}) for _ in range(3)]
-    for page in others:
-        page.goto(url)
-    time.sleep(5)
-    for frames in watch([first, *others], seconds):
-        print(f"of four pages: {median(frames):.0f} frames/s median, {min(frames)} worst second")
-
-
 def main() -> int:
     """Print all; 1 if the memory of a page grows, or it has less than 30 frames/s at the median."""
     parser = ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=int, default=120, help="of one page; a quarter of it for four (120)")
+    parser.add_argument("--seconds", type=int, default=120, help="how long (120)")
     seconds = parser.parse_args().seconds
     if not CHROMIUM.is_file():
         print("skipped: the live page, because chromium is not there (Debian: apt-get install chromium)")
@@ -147,10 +127,6 @@ def main() -> int:
         first.goto(url)
         time.sleep(5)
         is_well = one_page(first, seconds)
-        with ThreadPoolExecutor(1) as pool:  # playwright has an event loop in this thread
-            taken = pool.submit(asyncio.run, hostile(url)).result()
-        print(f"a thousand connections: {taken} taken; then {watch([first], 5)[0]} frames/s")
-        four_pages(browser, first, url, max(10, seconds // 4))
         browser.close()
     print(f"load of the machine after: {os.getloadavg()[0]:.1f}")
     return 0 if is_well else 1

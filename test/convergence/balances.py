@@ -163,12 +163,7 @@ class EnergyBalance:
     damping: float  # taken by beams, oil dampers and the base's hinge
     contact: float  # taken by contacts
     gap: float  # largest of work less change of energy, damping and contact at any step, in magnitude
-    moved: float  # measure of `gap`: the largest of that work, kinetic energy, and change of the weight's energy
-
-    @property
-    def share(self) -> float:
-        """`gap` as a share of `moved`."""
-        return self.gap / self.moved if self.moved > 0.0 else 0.0
+    share: float  # `gap` over the largest of that work, kinetic energy, and change of the weight's energy
 
 
 def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
@@ -186,7 +181,12 @@ def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
         gap = max(gap, abs(float(left)))
         moved = max(moved, abs(sums[0]), energies.kinetic(state), abs(energies.weight(state) - heavy))
     work, damping, lost = sums.tolist()
-    return EnergyBalance(work, damping, lost, gap, float(moved))
+    return EnergyBalance(work, damping, lost, gap, share_of(gap, float(moved)))
+
+
+def share_of(gap: float, moved: float) -> float:
+    """Return a gap as a share of what moved; 0 at rest."""
+    return gap / moved if moved > 0.0 else 0.0
 
 
 def tip_power(course: DriveCourse, state: State) -> Array:
@@ -206,19 +206,8 @@ def states_of(course: DriveCourse, dt: float) -> Iterator[tuple[float, State]]:
         for _ in range(count):
             if len(loads):
                 work.load[:] = work.load[1], loads[row]
-            status, _, _ = advance(
-                plan.tables,
-                state,
-                work,
-                scheme,
-                drives[row],
-                rates[row],
-                STEP_TOLERANCE,
-                PASSES,
-                LONGEST_INCREMENT,
-                None,
-                False,
-            )
+            drive, bounds = (drives[row], rates[row]), (STEP_TOLERANCE, PASSES, LONGEST_INCREMENT)
+            status, _, _ = advance(plan.tables, state, work, scheme, *drive, *bounds, None, False)
             assert status == OK, SENTENCES[status]
             row += 1
             yield span, state
@@ -285,19 +274,9 @@ class MomentumBalance:
     """Gap between the momentum of a motion and the impulses of weight and base."""
 
     linear_gap: float  # largest difference at any step, N s
-    linear_moved: float  # measure of it: the largest momentum, N s
+    linear_share: float  # of the largest momentum
     angular_gap: float  # likewise for the moment of momentum about the base's pivot, N m s
-    angular_moved: float  # N m s
-
-    @property
-    def linear_share(self) -> float:
-        """`linear_gap` as a share of `linear_moved`."""
-        return self.linear_gap / self.linear_moved if self.linear_moved > 0.0 else 0.0
-
-    @property
-    def angular_share(self) -> float:
-        """`angular_gap` as a share of `angular_moved`."""
-        return self.angular_gap / self.angular_moved if self.angular_moved > 0.0 else 0.0
+    angular_share: float
 
 
 def momentum_balance(course: DriveCourse, dt: float) -> MomentumBalance:
@@ -313,4 +292,5 @@ def momentum_balance(course: DriveCourse, dt: float) -> MomentumBalance:
         gaps.append(rows[-1] - first - impulse)
     found = [(float(np.hypot(x, y).max()), float(np.abs(turn).max())) for x, y, turn in (np.array(gaps).T, np.array(rows).T)]
     (linear_gap, angular_gap), (linear_moved, angular_moved) = found
-    return MomentumBalance(linear_gap, linear_moved, angular_gap, angular_moved)
+    linear, angular = share_of(linear_gap, linear_moved), share_of(angular_gap, angular_moved)
+    return MomentumBalance(linear_gap, linear, angular_gap, angular)

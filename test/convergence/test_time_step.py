@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from convergence import motions
 from default_boom import posture_angles
-from oracle import segments
+from reference.segments import equilibrium as segments
 
 from boom_twin import load_scene, simulate
 

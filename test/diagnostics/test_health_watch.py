@@ -9,7 +9,7 @@ import pytest
 
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
-from boom_twin.diagnostics.model_status import HealthWatch, ResidualWindow
+from boom_twin.diagnostics.model_status import INTERVAL, HealthWatch, ResidualWindow, StampWindow
 from boom_twin.types import Alarm, Health
 
 SECOND = 1_000_000_000
@@ -90,3 +90,14 @@ def test_a_residual_that_is_explained_is_none_and_else_a_warning_at_most_where_h
         told.append(window.status(judge, None, LOAD if second < 15 else "", is_judged))
     assert {(each.level, each.message) for each in told[:14]} == {(Level.OK, LOAD)}
     assert told[0].values["rms_normalised"] == 6.0 and (told[-1].level, told[-1].message) == (level, words)
+
+
+def test_a_window_holds_its_time_and_begins_anew_if_the_clock_is_set_back() -> None:
+    window, last = StampWindow(10 * INTERVAL, 1), 200 * INTERVAL
+    for stamp in range(0, last + 1, INTERVAL // 4):
+        if window.is_due(stamp):
+            window.add(stamp, np.array([float(stamp)]))
+    assert window.stamps.tolist() == list(range(last - 10 * INTERVAL, last + 1, INTERVAL))
+    assert window.is_due(last - INTERVAL)
+    window.add(last - INTERVAL, np.zeros(1))
+    assert window.stamps.tolist() == [last - INTERVAL]

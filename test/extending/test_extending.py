@@ -2,12 +2,83 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 import subprocess
 import sys
+from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
-from extending.worked_example import ROOT, WorkedExample
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = Path(__file__).parent
+DRIVES = ROOT / "test" / "data" / "drives" / "arch_session"
+PACKAGE = ("boom_twin", "msg_config")
+BEING_WRITTEN = shutil.ignore_patterns("*.pyc.*")  # byte code, by another process
+TOUCHED = re.compile(r"^\+\+\+ b/(\S+)$", re.MULTILINE)
+
+RUN = """
+import runpy, sys
+from pathlib import Path
+import boom_twin
+assert Path(boom_twin.__file__).is_relative_to(Path.cwd()), boom_twin.__file__
+sys.argv = sys.argv[1:]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+@dataclass(frozen=True)
+class WorkedExample:
+    """One folder of this directory."""
+
+    name: str
+
+    @property
+    def folder(self) -> Path:
+        return EXAMPLES / self.name
+
+    @property
+    def patch(self) -> str:
+        """What changes in files of the package; empty if nothing does."""
+        path = self.folder / "change.patch"
+        return path.read_text() if path.exists() else ""
+
+    @property
+    def new_files(self) -> dict[str, str]:
+        """Text of every new file by its path in the package."""
+        paths = (
+            path for part in PACKAGE for path in sorted((self.folder / part).rglob("*")) if path.suffix in (".py", ".yaml")
+        )
+        return {path.relative_to(self.folder).as_posix(): path.read_text() for path in paths}
+
+    @property
+    def touched(self) -> list[str]:
+        return sorted({*self.new_files, *TOUCHED.findall(self.patch)})
+
+    def apply(self, copy: Path) -> None:
+        """Copy the package, with the byte code of what does not change, to the folder `copy` and put the example on it."""
+        for part in PACKAGE:
+            shutil.copytree(ROOT / part, copy / part, symlinks=True, ignore=BEING_WRITTEN)
+        for path, text in self.new_files.items():
+            assert not (copy / path).exists(), f"{path} is no new file"
+            (copy / path).write_text(text)
+        if self.patch:
+            subprocess.run(["git", "apply", "-"], input=self.patch, text=True, cwd=copy, check=True, env=_outside_git(copy))
+
+    def check(self, copy: Path, **variables: str) -> None:
+        """Run ``check.py`` on the copy; AssertionError with all that it printed if it fails."""
+        environment = os.environ | {"PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"} | variables
+        command = [sys.executable, "-c", RUN, str(self.folder / "check.py"), str(DRIVES)]
+        done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, check=False, timeout=600)
+        assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
+
+
+def _outside_git(copy: Path) -> dict[str, str]:
+    """Let git take the copy for a plain folder, wherever it lies."""
+    return os.environ | {"GIT_CEILING_DIRECTORIES": str(copy.parent)}
+
 
 DOCUMENT = ROOT / "docs" / "extending.md"
 

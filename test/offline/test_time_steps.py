@@ -12,13 +12,18 @@ import numpy as np
 import pytest
 from command import main
 from default_boom import joint_angles_of_strokes, strokes_of_posture
+from drive_twin import drive_twin
+from fuzz import mcap_files
 from gate_sessions import write as write_by_rosbags
-from mcap.writer import IndexType, Writer
+from mcap.writer import IndexType
 from recordings import MessageWriter, read, scan, sensor_message
 from ros_messages import jazzy, load_topics, stamp_of
 from rosbags.rosbag2 import StoragePlugin
 
 from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin.offline.ground_truth import TipErrors, TipTruth
+from boom_twin.offline.recording import Recording
+from boom_twin.twin.blocks import block_of
 
 SECOND, START, ROWS = 10**9, 1_700_000_000 * 10**9, 1600
 DAY = 86_400 * SECOND
@@ -68,21 +73,18 @@ def test_memory_of_a_replay_goes_by_its_samples(tmp_path: Path, days: int, littl
     assert ROWS - 21 <= replayed(bag)["samples"] < ROWS  # the step must be confirmed for `gap`
 
 
+def entries(found: list[Sample], logs: list[int]) -> list[mcap_files.Entry]:
+    """The messages of samples in their order."""
+    topics = [load_topics().inputs[sample.stream] for sample in found]
+    return [
+        (topic.absolute, topic.type, "cdr", log, bytes(jazzy().serialize_cdr(sensor_message(sample), topic.type)))
+        for sample, topic, log in zip(found, topics, logs, strict=True)
+    ]
+
+
 def recorded(path: Path, found: list[Sample], logs: list[int], **options: Any) -> Path:
     """Write one file of samples in their order by the mcap library."""
-    inputs, channels = load_topics().inputs, dict[Stream, int]()
-    with path.open("wb") as stream:
-        writer = Writer(stream, **options)
-        writer.start(profile="ros2", library="test")
-        for sample, log in zip(found, logs, strict=True):
-            topic = inputs[sample.stream]
-            if sample.stream not in channels:
-                schema = writer.register_schema(topic.type, "ros2msg", b"")
-                channels[sample.stream] = writer.register_channel(topic.absolute, "cdr", schema)
-            data = bytes(jazzy().serialize_cdr(sensor_message(sample), topic.type))
-            writer.add_message(channels[sample.stream], log, data, log)
-        writer.finish()
-    return path
+    return mcap_files.write(path, entries(found, logs), **options)
 
 
 def order_of(path: Path) -> list[tuple[str, int]]:
@@ -113,12 +115,9 @@ def test_messages_are_in_file_order_where_the_clock_was_set_back(tmp_path: Path,
 def test_a_database_is_in_the_order_in_which_its_messages_were_stored(tmp_path: Path) -> None:
     found = samples(rows=ROWS // 2)
     logs = [sample.stamp - 3 * SECOND * (row >= 1201) for row, sample in enumerate(found)]
-    topics = [load_topics().inputs[sample.stream] for sample in found]
-    data = [
-        bytes(jazzy().serialize_cdr(sensor_message(sample), topic.type)) for sample, topic in zip(found, topics, strict=True)
-    ]
-    rows = zip([topic.absolute for topic in topics], logs, data, strict=True)
-    write_by_rosbags(tmp_path / "two", {topic.absolute: topic.type for topic in topics}, rows, StoragePlugin.SQLITE3)
+    found_entries = entries(found, logs)
+    rows = [(topic, log, data) for topic, _, _, log, data in found_entries]
+    write_by_rosbags(tmp_path / "two", {topic: kind for topic, kind, *_ in found_entries}, rows, StoragePlugin.SQLITE3)
     assert order_of(tmp_path / "two") == named(found)
 
 
@@ -159,3 +158,20 @@ def test_samples_that_wait_for_the_first_strokes_are_dropped_when_their_stamps_c
     ]
     assert len(stamps) - len(set(stamps)) <= 4 and len(set(stamps)) > 780  # until their step is confirmed
     assert twin.counts["unmatched"] >= 796
+
+
+def test_duration_and_errors_go_by_the_time_that_passed():
+    """The truth, by the first clock, is at rest until that was set, and elsewhere then."""
+    scene = load_scene()
+    still, twin = strokes_of_posture(scene, "arch"), drive_twin(scene)
+    stamps = [START + (5 * k + (-7_200_000 if k >= 120 else 0)) * SECOND // 1000 for k in range(200)]
+    samples = block_of([Sample(Stream.STROKES, stamp, still) for stamp in stamps], 4)
+    rows = twin.take(samples)
+    position = np.tile(rows.predictions.tip_position[0], (200, 1)) + (np.arange(200) >= 120)[:, np.newaxis]
+    errors = TipErrors(TipTruth(np.arange(200) * 0.005, position, np.zeros((200, 2))))
+    recording = Recording(4, errors=errors)
+    recording.add(rows, samples)
+    recording.close()
+    assert len(recording.whole.predictions.stamps) == 180 and len(recording.clock_sets) == 1
+    assert recording.duration == pytest.approx(178 * 0.005)  # without the time until the new stamps are confirmed
+    assert errors.rms["tip_error_rms_m"] == pytest.approx(0.0, abs=1e-6)

@@ -47,6 +47,15 @@ def one_rigid(**cylinder):
     return document() | {"sections": [section], "joints": [joint], "postures": {"up": [40]}}
 
 
+def undamped():
+    """The default scene as plain dicts, without any damping."""
+    spec = document()
+    for section, joint in zip(spec["sections"], spec["joints"], strict=True):
+        section.pop("beta", None)
+        joint["cylinder"].pop("d", None)
+    return spec
+
+
 def on_elastic_base(scene, stiffness=5.0e6, damping=None):
     """The boom on a base with an elastic hinge, N m/rad and N m s/rad."""
     return scene.model_copy(update={"base": scene.base.model_copy(update={"stiffness": stiffness, "damping": damping})})
@@ -76,7 +85,30 @@ def random_boom(seed):
     return _with_posture(spec, rng)
 
 
+def milder_boom(seed):
+    """One to five sections made of the default scene's parts, some of them heavier, softer, rigid or missing."""
+    rng = np.random.default_rng(seed)
+    spec = document()
+    sections, joints, count = spec["sections"], spec["joints"], 1 + seed % 5
+    milder = {"spread": (0.7, 1.5), "missing": 0.2, "rigid": MILDER_RIGID, "in_place_of_a_root": True}
+    chosen = [varied_section(sections[i], rng, **milder) for i in np.sort(rng.integers(0, 4, count))]
+    for section in chosen:
+        section.pop("rod_pin", None)
+    chosen[0]["rod_pin"] = [0.60, -0.12]
+    mounted = [varied_joint(joints[0], rng, (0.6, 1.5), 0.2)]
+    mounted += [varied_joint(joints[i], rng, (0.6, 1.5), 0.2) for i in rng.integers(1, 4, count - 1)]
+    vary_cylinders(mounted, seed)
+    spec |= {"sections": chosen, "joints": mounted, "postures": {}}
+    spec["base"] = spec["base"] | {"inclination": float(rng.uniform(-0.1, 0.1))}
+    if rng.random() < 0.5:
+        spec["tip"] = {"payload": float(rng.uniform(5.0, 60.0))}
+    if rng.random() < 0.5:
+        spec["line_fill"] = float(rng.uniform(2.0, 12.0))
+    return scene_of(spec)
+
+
 RIGID = {"mass": 140.0, "com": [1.5, 0.05], "inertia": 110.0}
+MILDER_RIGID = {"mass": 150.0, "com": [1.5, 0.03], "inertia": 120.0}
 
 
 def varied_section(section, rng, spread=(0.5, 2.0), missing=0.25, rigid=RIGID, in_place_of_a_root=False):

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from compiled import compile_scene
 from default_boom import strokes_of_posture
-from oracle.clearance import rigid
-from oracle.clearance.scenes import RODS, with_pins
+from oracle.clearance.scenes import RODS, rigid_document, smooth_move, with_pins
 from reference.contact_law import HYSTERESIS, Contact
 from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
@@ -25,10 +24,10 @@ HEADINGS = np.array([0.5, -0.3, -0.6, -1.0])
 def both(count, step, treatment="contact", clearance=1e-4, end=END, rows=4e-3):
     """The model in steps of `step`, and the oracle at the same rows, every `rows` s."""
     index, headings = count - 1, HEADINGS[:count]
-    spec = rigid.document(count, index) | {"postures": {"test": np.degrees(headings).tolist()}}
+    spec = rigid_document(count, index) | {"postures": {"test": np.degrees(headings).tolist()}}
     scene = with_pins(spec, [RODS[index]], clearance, treatment)
     lengths = np.array([geometry.cylinder_length(spec, headings, i) for i in range(count)])
-    own, first = rigid.move(lengths[index], TRAVEL[index], MOVE), strokes_of_posture(scene, "test")
+    own, first = smooth_move(lengths[index], TRAVEL[index], MOVE), strokes_of_posture(scene, "test")
 
     def drive(times):
         strokes, rates = np.tile(first, (len(times), 1)), np.zeros((len(times), count))
@@ -48,9 +47,9 @@ def both(count, step, treatment="contact", clearance=1e-4, end=END, rows=4e-3):
 def oracle(count, stiffness, gap, times):
     """The oracle's motion at `times` (s); the same for every step of the model."""
     index, headings = count - 1, HEADINGS[:count]
-    spec = rigid.document(count, index)
+    spec = rigid_document(count, index)
     length = geometry.cylinder_length(spec, headings, index)
-    own = rigid.move(length, TRAVEL[index], MOVE)
+    own = smooth_move(length, TRAVEL[index], MOVE)
     contact = Contact(stiffness, HYSTERESIS["lankarani-nikravesh"](0.9), gap, smoothing=SMOOTH)
     boom = freed(spec, headings, index, contact)
     return boom.follow(lambda t: own(t)[:2], boom.rest(length, headings[index]), np.array(times), [MOVE])

@@ -1,4 +1,4 @@
-"""The twin's equilibrium and motion against the Exudyn rig on booms that neither was made for."""
+"""The twin's equilibrium and motion against the Exudyn rig on random booms that neither was made for."""
 
 from __future__ import annotations
 
@@ -7,12 +7,33 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin import simulate, statics
+from default_boom import strokes_of_angles
+from oracle import booms
+
+from boom_twin import Scene, simulate, statics
 from boom_twin.scene.kinematics import stroke_range
 from boom_twin.validation import rig
 from boom_twin.validation.rig.motion import RANGE_SAMPLES
 
 STROKE = 0.04  # m, of every other cylinder within one second
+
+
+@pytest.fixture
+def random_boom(seed: int) -> tuple[Scene, np.ndarray]:
+    """The scene of a test's parameter `seed`, every third on an elastic base; strokes (m), shape (n,), inside its ranges."""
+    scene = booms.milder_boom(seed)
+    if seed % 3 == 2:
+        rng = np.random.default_rng([seed, 2])
+        scene = booms.on_elastic_base(scene, 10.0 ** rng.uniform(6.5, 8.0), 10.0 ** rng.uniform(4.0, 5.0))
+    return scene, random_strokes(scene, seed)
+
+
+def random_strokes(scene: Scene, seed: int) -> np.ndarray:
+    """Strokes (m), shape (n,), of joint angles well inside their ranges."""
+    rng = np.random.default_rng(seed + 10_000)
+    low, high = np.radians([joint.range_deg for joint in scene.joints]).T
+    inside = [rng.uniform(a + 0.1 * (b - a), b - 0.1 * (b - a)) for a, b in zip(low, high, strict=True)]
+    return strokes_of_angles(scene, np.array(inside))
 
 
 def rms(vectors):

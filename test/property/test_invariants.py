@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracle import booms, segments
+from oracle import booms
+from reference.segments import equilibrium as segments
 
 from boom_twin import simulate, statics
 

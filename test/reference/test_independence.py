@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 KNOWN = {"scene.schema"}
-NAMES = {"Scene", "SolverError", "UsageError"}
+NAMES = {"Scene", "SolverError"}
 
 
 def test_reference_models_import_no_equation_of_the_twin() -> None:

@@ -76,7 +76,3 @@ class Bench:
     def oddities(self, edit: Edit) -> list[Fault]:
         """Return the warnings of the default scene after an edit, which must load."""
         return examine(self.edited(edit))[1]
-
-    def oddities_of(self, values: Values) -> list[Fault]:
-        """Return the warnings of a scene of these values, which must load."""
-        return examine(self.write(values))[1]

@@ -19,7 +19,7 @@ from .geometry import Document, Mass, Point, Turn, dot, links, on_left, on_right
 
 @dataclass(frozen=True, slots=True)
 class PlacedBodies:
-    """A part at one heading: J and dJ/dphi (kg m^2), `moments` sum m z' and `height` sum m z (kg m), the bush.
+    """A part at one heading: J and dJ/dphi (kg m^2), `moments` sum m z' (kg m), the bush.
 
     Times gravity, the moments are the weight's force on phi.
     """
@@ -27,7 +27,6 @@ class PlacedBodies:
     inertia: float
     slope: float
     moments: complex
-    height: complex
     pin: Point
 
 
@@ -87,7 +86,6 @@ def _placed(bodies: Sequence[tuple[Mass, Point, Turn]], pin: Point) -> PlacedBod
         sum(b.mass * abs(z.first) ** 2 + b.inertia * t.first**2 for b, z, t in bodies),
         2.0 * sum(b.mass * (z.first.conjugate() * z.second).real + b.inertia * t.first * t.second for b, z, t in bodies),
         sum(b.mass * z.first for b, z, _ in bodies),
-        sum(b.mass * z.value for b, z, _ in bodies),
         pin,
     )
 
@@ -118,11 +116,6 @@ class OilCylinder:
     def tension(self, length: float, rate: float, drive: tuple[float, float]) -> float:
         """Return the tension of the oil (N), at length and rate of the drive."""
         return self.k * (length - drive[0]) + self.d * (rate - drive[1])
-
-    def energy(self, length: float, psi: float, rate: float, swing: float, drive: float, gravity: complex) -> float:
-        """Return the energy of motion, oil and weight, J, at a length of the drive."""
-        moving = self.rod_mass * rate**2 + self.inertia(length) * swing**2
-        return 0.5 * moving + 0.5 * self.k * (length - drive) ** 2 - dot(gravity, self.moment(length) * exp(1j * psi))
 
     def holding(self, length: float, psi: float, tension: float, gravity: complex) -> complex:
         """Force (N, complex) on the rod's pin that holds the cylinder still at a tension of the oil."""

@@ -17,19 +17,18 @@ J(phi) and P(phi) are the part's (`parts`), I(l) the cylinder's. The mass matrix
 from __future__ import annotations
 
 from cmath import exp, phase
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 from reference.contact_law import Contact
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-
-from boom_twin import UsageError
 
 from . import geometry
 from .bodies import Lever, OilCylinder, SixBar
 from .geometry import Document, Point, dot
-from .impacts import follow
 
 NEAR = 0.05  # rad, about the guess
 PASSES = 40
@@ -56,23 +55,19 @@ LONGEST = 1e-2  # s, step
 
 @dataclass(frozen=True)
 class PinMotion:
-    """A motion in m rows: tip and offset of the pin in the bush (m), each (m, 2).
-
-    `energy` (J, oil, weight and motion, without that of the contact): (m,).
-    """
+    """A motion in m rows: tip and offset of the pin in the bush (m), each (m, 2)."""
 
     tip: np.ndarray
     offset: np.ndarray
-    energy: np.ndarray
 
 
 @dataclass(frozen=True)
 class PinnedBoom:
-    """`part`: a `Lever` or `SixBar`; `contact` None: an ideal pin, for `rest` only; gravity complex, m/s^2."""
+    """`part`: a `Lever` or `SixBar`; gravity complex, m/s^2."""
 
     part: Lever | SixBar
     cylinder: OilCylinder
-    contact: Contact | None
+    contact: Contact
     gravity: complex
 
     def rest(self, drive: float, phi: float) -> Rest:
@@ -80,41 +75,33 @@ class PinnedBoom:
         offset = 0j
         for _ in range(PASSES):
             rest = self._held(drive, phi, offset)
-            found = 0j if self.contact is None else self.contact.resting_offset(-rest.force)
+            found = self.contact.resting_offset(-rest.force)
             if abs(found - offset) < SAME:
                 return rest
             offset = found
         raise ArithmeticError(f"no side to lie on at {drive:g} m near {phi:g} rad: the pin bears {abs(rest.force):g} N")
 
-    def follow(
-        self,
-        drive: Drive,
-        rest: Rest,
-        times: np.ndarray,
-        breaks: Sequence[float] = (),
-        rate: float = 0.0,
-    ) -> PinMotion:
-        """Motion from an equilibrium, `rate` of phi in rad/s, to ascending `times` (s); `breaks`: of the drive."""
+    def follow(self, drive: Drive, rest: Rest, times: np.ndarray, breaks: Sequence[float] = ()) -> PinMotion:
+        """Motion from an equilibrium to ascending `times` (s); `breaks`: of the drive."""
         # states are deviations from the rest, so that a relative tolerance means something
         zero, tolerance = np.array([rest.phi, rest.length, rest.psi, 0.0, 0.0, 0.0]), 1e-8
         deviations = follow(
             lambda time, state, entry: self.rates(drive(time), zero + state, entry),
             lambda time, state: self.gap(zero + state),
-            [0.0, 0.0, 0.0, rate, 0.0, 0.0], times, tolerance, tolerance * np.repeat([1e-5, 1e-2], 3),
-            breaks, LONGEST, "LSODA",
+            [0.0] * 6, times, breaks,
+            method="LSODA", rtol=tolerance, atol=tolerance * np.repeat([1e-5, 1e-2], 3), max_step=LONGEST,
         )  # fmt: skip
         states = zero + deviations
         return PinMotion(
             _pairs([self.part.tip_at(state[0]) for state in states]),
             _pairs([self.pin(state)[0] for state in states]),
-            np.array([self.energy(drive(time)[0], state) for time, state in zip(times, states, strict=True)]),
         )
 
     def rates(self, drive: tuple[float, float], state: np.ndarray, entry: float | None) -> list[float]:
         """Derivative of (phi, l, psi, phi', l', psi') at length and rate of the drive."""
         phi, length, psi, turn, speed, swing = (float(value) for value in state)
         c, g, u, placed = self.cylinder, self.gravity, exp(1j * psi), self.part.at(phi)
-        force = self._bush.force(*self._pin(length, u, turn, speed, swing, placed.pin), entry)
+        force = self.contact.force(*self._pin(length, u, turn, speed, swing, placed.pin), entry)
         arm = length - c.rod_com
         moment = dot(g, placed.moments) - dot(force, placed.pin.first) - 0.5 * placed.slope * turn**2
         pull = dot(force, u) - c.tension(length, speed, drive)
@@ -126,25 +113,12 @@ class PinnedBoom:
         """Gap (m, positive in contact) and its rate (m/s)."""
         offset, rate = self.pin(state)
         distance = abs(offset)
-        return self._bush.gap(offset), dot(offset, rate) / distance if distance else abs(rate)
+        return self.contact.gap(offset), dot(offset, rate) / distance if distance else abs(rate)
 
     def pin(self, state: np.ndarray) -> tuple[complex, complex]:
         """Offset (m) of the pin in the bush and its rate (m/s), complex."""
         phi, length, psi, turn, speed, swing = (float(value) for value in state)
         return self._pin(length, exp(1j * psi), turn, speed, swing, self.part.at(phi).pin)
-
-    def energy(self, drive: float, state: np.ndarray) -> float:
-        """Return the energy of motion, weight and oil, J, without that of the contact."""
-        phi, length, psi, turn, speed, swing = state
-        placed = self.part.at(phi)
-        own = 0.5 * placed.inertia * turn**2 - dot(self.gravity, placed.height)
-        return float(own + self.cylinder.energy(length, psi, speed, swing, drive, self.gravity))
-
-    @property
-    def _bush(self) -> Contact:
-        if self.contact is None:
-            raise UsageError("contact = None: an ideal pin has an equilibrium but no motion here. Give a `Contact`.")
-        return self.contact
 
     def _held(self, drive: float, phi: float, offset: complex) -> Rest:
         """The equilibrium with the pin at `offset`."""
@@ -165,15 +139,68 @@ class PinnedBoom:
         return self.cylinder.pin + length * u - bush.value, rate
 
 
+MOST = 20_000  # pieces of a motion
+
+Rates = Callable[[float, np.ndarray, float | None], Sequence[float] | np.ndarray]
+Gap = Callable[[float, np.ndarray], tuple[float, float]]
+
+
+def follow(
+    rates: Rates, gap: Gap, start: list[float], times: np.ndarray, breaks: Sequence[float], **options: Any
+) -> np.ndarray:
+    """States (m, n) of a motion with one contact at ascending `times`, cut at every touch, release and break (s).
+
+    `breaks`: where the drive is not smooth. `options` are those of SciPy's solver.
+
+    `rates`: (time, state, approach speed at the last touch or None in flight) -> derivative of the state.
+    `gap`: (time, state) -> gap (m, positive in contact) and its rate (m/s).
+    """
+    stops = [*sorted(t for t in breaks if times[0] < t < times[-1]), times[-1]]
+    pieces = list(_pieces(rates, gap, times[0], np.array(start, dtype=float), stops, options))
+    which = np.searchsorted([found.t[0] for found in pieces], times, side="right") - 1
+    return np.array([pieces[k].sol(time) for k, time in zip(which, times, strict=True)])
+
+
+def _pieces(
+    rates: Rates, gap: Gap, now: float, state: np.ndarray, stops: Sequence[float], options: dict[str, Any]
+) -> Iterator[Any]:
+    """Solutions between touches, releases and stops."""
+    depth, rate = gap(now, state)
+    entry = max(rate, 0.0) if depth >= 0.0 else None
+    count = 0
+    for stop in stops:
+        while now < stop:
+            event = _crossing(gap, entry is not None)
+            found = solve_ivp(rates, (now, stop), state, dense_output=True, events=event, args=(entry,), **options)
+            count += 1
+            if not found.success or count > MOST:
+                raise ArithmeticError(f"t = {found.t[-1]:g} s, after {count} pieces: {found.message}")
+            yield found
+            now, state = found.t[-1], found.y[:, -1]
+            if found.status == 1:
+                entry = abs(gap(now, state)[1]) if entry is None else None
+
+
+def _crossing(gap: Gap, touching: bool) -> Any:
+    """Return the event of the gap's change of sign, which ends a piece."""
+
+    def crossing(time: float, state: np.ndarray, entry: float | None) -> float:
+        return gap(time, state)[0]
+
+    end = cast(Any, crossing)
+    end.terminal, end.direction = True, -1.0 if touching else 1.0
+    return end
+
+
 def _pairs(values: Sequence[complex]) -> np.ndarray:
     both = np.array(values)
     return np.column_stack([both.real, both.imag])
 
 
-def freed(document: Document, headings: Sequence[float] | np.ndarray, index: int, contact: Contact | None) -> PinnedBoom:
+def freed(document: Document, headings: Sequence[float] | np.ndarray, index: int, contact: Contact) -> PinnedBoom:
     """`PinnedBoom` of cylinder `index` (0-based): what lies outboard turns as one body, what lies inboard is ground.
 
-    That cylinder has k, barrel and rod. `headings` (rad) of the sections to the base's x axis. No contact: an ideal pin.
+    That cylinder has k, barrel and rod. `headings` (rad) of the sections to the base's x axis.
     """
     joint, places = document["joints"][index], geometry.pivots(document, headings)
     body = geometry.outboard(document, headings, index)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from oracle import booms
 
 pytest.importorskip("exudyn")
 
@@ -21,7 +22,8 @@ def length_of_slider_crank(document, angle):
 
 
 @pytest.mark.parametrize("inclination", [0.0, 0.2])
-def test_moment_balance_of_one_rigid_section(one_rigid, inclination):
+def test_moment_balance_of_one_rigid_section(inclination):
+    one_rigid = booms.one_rigid(k=2.0e6)
     one_rigid["base"] = one_rigid["base"] | {"inclination": inclination}
     found = statics(Scene.model_validate(one_rigid), np.array([0.5]))
     angle, force = found["joints"][0], found["forces"][0]
@@ -35,9 +37,9 @@ def test_moment_balance_of_one_rigid_section(one_rigid, inclination):
     assert found["tip"] == pytest.approx([3 * np.cos(angle), 3 * np.sin(angle)], abs=1e-9)
 
 
-def test_force_is_spring_and_damper_against_the_drive(one_rigid):
+def test_force_is_spring_and_damper_against_the_drive():
+    one_rigid = booms.one_rigid(k=2.0e6, d=6.0e4)
     cylinder = one_rigid["joints"][0]["cylinder"]
-    cylinder["d"] = 6.0e4
     move = Programme((0.5,), (Move(0, 0.05, 0.3, 0.55),))
     rows = simulate(Scene.model_validate(one_rigid), move, 0.4, step=2.5e-4, output_step=2.5e-4)
     length = length_of_slider_crank(one_rigid, rows["joints"][:, 0])

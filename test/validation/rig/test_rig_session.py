@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from oracle import booms
 
 pytest.importorskip("exudyn")
 
-from boom_twin import Scene
 from boom_twin.validation.rig import Move, Programme, observe, simulate
 from boom_twin.validation.rig.session import EPOCH, Sensors, read, specific_force
 
@@ -39,8 +39,8 @@ MOVE = Programme((0.5,), (Move(0, 0.2, 0.6, 0.56),))
 
 
 @pytest.fixture
-def motion(one_rigid):
-    scene = Scene.model_validate(one_rigid)
+def motion():
+    scene = booms.scene_of(booms.one_rigid(k=2.0e6))
     return scene, simulate(scene, MOVE, 1.0, step=1e-3)
 
 

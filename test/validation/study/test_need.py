@@ -16,6 +16,8 @@ from boom_twin import Scene, UsageError, load_scene, simulate, statics
 from boom_twin.reduction.search import Proposal, propose
 from boom_twin.scene.edit import edited
 
+TWO_SECTIONS = booms.short_boom(2)
+
 
 def measured_anew(full: Scene, lean: Scene) -> float:
     """Largest distance of two models' tips (m) at rest in all postures and in the move, by the commands' own functions."""
@@ -48,8 +50,8 @@ def test_the_proposal_leaves_something_out_and_is_faster(proposal: Proposal) -> 
     assert proposal.next is not None and proposal.next[1] > 1e-3
 
 
-def test_all_that_costs_goes_at_a_huge_error(two_sections: Scene) -> None:
-    found = propose(two_sections, 10.0)
+def test_all_that_costs_goes_at_a_huge_error() -> None:
+    found = propose(TWO_SECTIONS, 10.0)
     assert found.next is None
     assert [found.scene.is_flexible(i) for i in range(2)] == [False, False]
     assert all(joint.mL is joint.cylinder.rod is joint.cylinder.barrel is None for joint in found.scene.joints)
@@ -65,24 +67,22 @@ def test_it_is_kept_on_booms_of_all_kinds(seed: int) -> None:
         assert measured_anew(scene, found.scene) <= 1.001 * most
 
 
-def test_an_error_that_is_none_is_refused(two_sections: Scene) -> None:
+def test_an_error_that_is_none_is_refused() -> None:
     for most in (0.0, float("nan"), float("inf")):
         with pytest.raises(UsageError, match=r"need = .* m: must be positive"):
-            propose(two_sections, most)
+            propose(TWO_SECTIONS, most)
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory, two_sections: Scene) -> tuple[Path, Path]:
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A scene file and where its lean one goes."""
     folder = tmp_path_factory.mktemp("need")
     with (folder / "full.yaml").open("w", encoding="utf-8") as stream:
-        YAML(typ="safe").dump(json.loads(two_sections.model_dump_json(exclude_none=True)), stream)
+        YAML(typ="safe").dump(json.loads(TWO_SECTIONS.model_dump_json(exclude_none=True)), stream)
     return folder / "full.yaml", folder / "lean.yaml"
 
 
-def test_the_command_writes_a_scene_that_loads(
-    written: tuple[Path, Path], two_sections: Scene, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_writes_a_scene_that_loads(written: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     full, lean = map(str, written)
     assert main(["check", full, "--need", "tip = 0.2 cm", "--out", lean, "--json"]) == 0
     out, err = capsys.readouterr()
@@ -91,4 +91,4 @@ def test_the_command_writes_a_scene_that_loads(
     assert values["need_tip_m"] == 2e-3 and values["lean_edits"] and values["mass_kg"] > 0.0
     assert values["lean_tip_error_m"] == max(values["lean_rest_error_m"], values["lean_move_error_max_m"]) <= 2e-3
     assert "posture" in values["measured_in_move"] and "Another motion may differ" in values["note"]
-    assert measured_anew(two_sections, load_scene(lean)) == pytest.approx(values["lean_tip_error_m"], rel=0.01)
+    assert measured_anew(TWO_SECTIONS, load_scene(lean)) == pytest.approx(values["lean_tip_error_m"], rel=0.01)
