@@ -97,11 +97,10 @@ def test_a_fit_that_still_moves_says_so(monkeypatch: pytest.MonkeyPatch) -> None
     assert not fitted(Bent(), (), lambda passes: None).is_settled
 
 
-def test_a_step_that_had_to_be_shortened_is_no_end(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_that_had_to_be_shortened_is_no_end() -> None:
     """Readings of 10 bend so fast that the first step ends at 1/32 of its length, with residuals of 1000."""
-    monkeypatch.setattr(Bent, "bend", 1e6)
     problem = Bent()
-    problem.readings = np.full(40, 10.0)
+    problem.bend, problem.readings = 1e6, np.full(40, 10.0)
     found = fitted(problem, (), lambda passes: None)
     (left,) = problem.innovations([problem.values(found.deviations)], None)
     assert found.is_settled == (abs(left[:, 0]).max() < 3.0), (found, left[0])

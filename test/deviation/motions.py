@@ -91,8 +91,3 @@ def measured(name, rate=200.0, seed=3):
         read(joints, sensors.angle_sigma, sensors.angle_resolution, angles),
         acceleration,
     )
-
-
-def rms(values):
-    """Of vectors (k, 2)."""
-    return float(np.sqrt((values**2).sum(axis=1).mean()))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from deviation.motions import measured, rms, true_motion
+from analysis.reference_errors import rms
+from deviation.motions import measured, true_motion
 
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.offline.recording import Recording

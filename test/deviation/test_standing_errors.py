@@ -7,8 +7,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from analysis.reference_errors import rms
 from default_boom import strokes_of_posture
-from deviation.motions import measured, rms, true_motion
+from deviation.motions import measured, true_motion
 from scipy.stats import norm
 
 from boom_twin import Sample, Stream, Twin, load_scene, statics

@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from analysis.reference_errors import rms
 from default_boom import strokes_of_angles
 from oracle import booms
 
@@ -34,10 +35,6 @@ def random_strokes(scene: Scene, seed: int) -> np.ndarray:
     low, high = np.radians([joint.range_deg for joint in scene.joints]).T
     inside = [rng.uniform(a + 0.1 * (b - a), b - 0.1 * (b - a)) for a, b in zip(low, high, strict=True)]
     return strokes_of_angles(scene, np.array(inside))
-
-
-def rms(vectors):
-    return np.sqrt(np.mean(np.sum(np.square(vectors), axis=-1)))
 
 
 def seeds(first, usual, last):

@@ -92,9 +92,6 @@ def shows_what_was_said(page: Any, witness: Witness) -> None:
         assert shown == pytest.approx(said, rel=1e-6)
     page.keyboard.press("4")
 
-    def level_of(statuses: dict[str, Any], name: str) -> str:
-        return LEVELS[statuses[name].level[0]].name if name in statuses else "unknown"
-
     def are_the_lamps() -> bool:
         """They are those of one of the newest messages; an alarm stands in the place of the lamp for all alarms."""
         texts = page.locator("#lamps tr").all_inner_texts()[1:]

@@ -1,4 +1,4 @@
-"""package.xml against what the package is and uses."""
+"""Dependencies: package.xml names those that the package imports; a command without an optional one says what to install."""
 
 from __future__ import annotations
 
