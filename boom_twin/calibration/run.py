@@ -108,12 +108,13 @@ def calibrate(
     mapping: str | Path | None = None,
     progress: Progress = lambda share, what: None,
     window: TimeWindow = WHOLE,
+    namespace: str = "",
 ) -> Calibration:
     """Estimate parameters of `scene` from healthy sessions of its boom, each begun at rest.
 
     The last session is held out; of a single one, its last third. `settings` give the noise of the sensors. `mapping` is by
     default that of the sessions. `progress` is told the share done and what comes next. `window` is the part of each session
-    that is used.
+    that is used. `namespace` is that of the node in the sessions.
 
     Raises
     ------
@@ -125,7 +126,7 @@ def calibrate(
     settings, choice = settings or Settings(), choice or Choice()
     progress(0.0, "reading")
     paths, joints = [Path(bag) for bag in bags], len(scene.joints)
-    mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
+    mapped = common_mapping(paths, Path(mapping) if mapping else None, joints, namespace)
     topics = mapped.topics.of_scene(scene.joints)
     rigging = Rigging(topics.noise_of(settings), tuple(topics.mounts(joints)), common_reading(paths, mapped), topics.places)
     sessions = read_sessions(paths, topics, joints, window)
@@ -173,9 +174,9 @@ def common_reading(paths: Sequence[Path], mapped: Mapped) -> StrokeReading:
     return found[0]
 
 
-def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> Mapped:
+def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int, namespace: str) -> Mapped:
     """Return the mapping of all sessions, or the one at `mapping`; UsageError if the sessions' mappings differ."""
-    found = [mapping_of(path, mapping, joints) for path in paths]
+    found = [mapping_of(path, mapping, joints, namespace) for path in paths]
     for path, each in zip(paths, found, strict=True):
         if each.topics != found[0].topics:
             raise UsageError(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from .. import __version__
 from ..errors import BoomTwinError, UsageError
 from ..offline.progress import ProgressLine
-from .arguments import add_json, add_session, files_of, window_of
+from .arguments import SESSION_NAMESPACE, add_json, add_namespace, add_session, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, warn, warn_incomplete
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     whose = "estimate the zeros of all sensors (default), of all but the stroke transducers, or none"
     parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
     add_session(parser)
+    add_namespace(parser, f"{SESSION_NAMESPACE} and --params")
     parser.add_argument("--date", metavar="DATE", help="date of the provenance (default: today)")
     parser.add_argument("--force", action="store_true", help="overwrite existing results")
     add_json(parser)
@@ -43,7 +44,7 @@ def run(args: Namespace) -> int:
     sources = files_of(args, "bags", "scene", "params", "mapping")
     refuse_overwriting(args.out, sources, args.force)
     scene = _scene(args)
-    settings = open_session_settings(args.bags[0], args.params)
+    settings = open_session_settings(args.bags[0], args.params, args.namespace)
     names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
     choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
     args.out.parent.mkdir(parents=True, exist_ok=True)  # before the work, which a folder that cannot be made would waste
@@ -53,7 +54,7 @@ def run(args: Namespace) -> int:
         def show(share: float, what: str) -> None:
             bar.update(100.0 * share - bar.done)
 
-        found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, show, window_of(args))
+        found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, show, window_of(args), args.namespace)
     wall = time.perf_counter() - began
     credit = f"{args.date or time.strftime('%Y-%m-%d')} by boom_twin {__version__}"
     refuse_overwriting(args.out, sources, args.force)  # again: somebody may have put something there meanwhile

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .arguments import add_json, add_session, files_of, window_of
+from .arguments import SESSION_NAMESPACE, add_json, add_namespace, add_session, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     place = "folder for modes.json and stabilisation diagrams, new or empty"
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
     add_session(parser)
+    add_namespace(parser, f"{SESSION_NAMESPACE} and --params")
     add_json(parser)
 
 
@@ -34,9 +35,9 @@ def run(args: Namespace) -> int:
     from ..system.result_folder import MODAL, result_folder
 
     bag, out = Path(args.bag), Path(args.out)
-    scene, settings = open_session_scene(bag, args.scene).scene, open_session_settings(bag, args.params)
+    scene, settings = open_session_scene(bag, args.scene).scene, open_session_settings(bag, args.params, args.namespace)
     joints = len(scene.joints)
-    mapped = common_mapping([bag], args.mapping, joints)
+    mapped = common_mapping([bag], args.mapping, joints, args.namespace)
     rigging = Rigging(settings, tuple(mapped.topics.mounts(joints)), common_reading([bag], mapped))
     with result_folder(out, MODAL, files_of(args, "bag", "scene", "params", "mapping")) as building:
         tell("reading the session ..")

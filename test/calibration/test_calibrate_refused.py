@@ -28,6 +28,11 @@ def test_a_session_that_is_too_short(short, two_sections, tmp_path):
         calibrate([bag], two_sections)
 
 
+def test_a_session_of_a_node_without_the_namespace(short, two_sections, tmp_path):
+    with pytest.raises(BagError, match="/front/cylinder_strokes"):
+        calibrate([short.write(tmp_path / "bag", 0)], two_sections, namespace="front")
+
+
 def test_nothing_is_told_of_a_boom_that_stands_still(two_sections, tmp_path):
     stamps = 10**18 + 5_000_000 * np.arange(30 * SECOND)
     strokes = np.tile(strokes_of_posture(two_sections, "arch"), (len(stamps), 1))
