@@ -133,7 +133,6 @@ class Evidence:
     ) -> None:
         self._odds, self._faults = settings.name_odds, tuple(faults)
         self.sure = math.log(settings.name_odds / (1.0 - settings.name_odds))
-        self._needed = np.full(len(faults), NONE)  # evidence below which a fault is left out
         self._is_size = np.array([fault.is_size for fault in faults])
         sized = [fault for fault in faults if fault.is_size]
         self._sizes, own = np.array([fault.size for fault in sized]), np.array(errors)[self._is_size]
@@ -166,7 +165,6 @@ class Evidence:
         every[:, ~self._is_size] = self._gains[-1] - np.array(self._gains)[:-1] - explained[:, None]
         best, onsets = every.max(axis=0), len(every) - 1 - every[::-1].argmax(axis=0)
         evidence = best + np.log(np.exp(every - best).mean(axis=0))
-        evidence[evidence < self._needed] = NONE
         causes = {"": 0.0}
         for fault, each in zip(self._faults, evidence.tolist(), strict=True):  # a named fault may have ended, or changed
             causes[fault.cause] = np.logaddexp(causes.get(fault.cause, NONE), each)
@@ -207,10 +205,6 @@ class Evidence:
         above, below = log_ndtr((means - self._least) / deviations), log_ndtr((-means - self._least) / deviations)
         after = np.where(self._is_signed, np.logaddexp(above, below) - math.log(2.0), above)
         return np.asarray(after - log_ndtr(-self._least / self._sizes))
-
-    def postpone(self, place: int, evidence: float) -> None:
-        """Leave out a sensor or a lag of uncertain size until its evidence has grown by `sure`."""
-        self._needed[place] = evidence + self.sure
 
 
 def likeliest(size: float, least: float, sure: float, gain: Callable[[float], Array]) -> Likeliest | None:

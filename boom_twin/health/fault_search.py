@@ -206,10 +206,7 @@ class FaultSearch:
         best = max(likely, key=lambda place: likely[place], default=verdict.place)
         rivals = [likely[best] - each for place, each in likely.items() if place != best]
         if verdict.place not in found or min(rivals, default=math.inf) < self._decision.sure:
-            if fault.is_size:
-                self._unsure[verdict.place] = verdict.evidence + self._decision.sure
-            else:
-                self._decision.postpone(verdict.place, verdict.evidence)
+            self._unsure[verdict.place] = verdict.evidence + self._decision.sure
             return []
         sized, spread, onset, _ = found[best]
         if fault.kind == "off" and abs(sized.size) < self._certain * spread:  # its zero still drifts

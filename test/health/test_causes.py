@@ -75,15 +75,6 @@ def test_no_name_where_another_cause_explains_as_much():
     assert verdict([IMU, JOINT], [[8.0, 4.0]] * 40)[0].place == 0
 
 
-def test_a_fault_of_no_size_waits_alone():
-    """Once a sensor's zero is not sure, another one is named by what it gained before, until the first has gained more."""
-    evidence, nothing = evidence_of([IMU, JOINT]), Scores(np.zeros(0), np.zeros((0, 0)))
-    found = [evidence.take(second * SECOND, np.array([0.0, 8.0, 4.0]), nothing) for second in range(10)][-1]
-    evidence.postpone(found.place, found.evidence)
-    after = [evidence.take(second * SECOND, np.array([0.0, 8.0, 4.0]), nothing).place for second in range(10, 13)]
-    assert (found.place, after) == (0, [1, 0, 0])
-
-
 def test_evidence_is_the_ratio_of_likelihoods_of_gaussian_readings():
     """Against the integral over all sizes, by scipy, of a fault from each onset, with errors of the scene all the time."""
     rng, faults = np.random.default_rng(5), [SPRING, SECTION, LOAD, MASS]
@@ -302,6 +293,18 @@ def test_of_two_faults_that_are_alike_none_is_named():
     assert taken(FaultTwins(load_scene(), made, SETTINGS), 60) == []
 
 
+class Doubting(Follower):
+    """A twin in which the zero of a sensor changes once the evidence has grown."""
+
+    def __init__(self, change, sigma, *more):
+        super().__init__(*more)
+        self._change, self._sigma = change, sigma
+
+    def zeros(self, channels):
+        """Return the zero, its variance, and its error by the scene."""
+        return np.array([self._change * (self.evidence > 0.0)]), np.array([self._sigma**2]), np.zeros(1)
+
+
 @pytest.mark.parametrize(
     ("channel", "sigma", "change", "is_named"),
     [
@@ -314,16 +317,25 @@ def test_of_two_faults_that_are_alike_none_is_named():
 def test_a_sensor_is_named_off_above_what_a_healthy_boom_shows(channel, sigma, change, is_named):
     """Its zero changes in second 20: by more than `force_deviation`, 5 kN, or 3.1 times 0.2 mrad, by which statics are off."""
 
-    class Doubting(Follower):
-        def zeros(self, channels):
-            """Return the zero, its variance, and its error by the scene."""
-            return np.array([change * (self.evidence > 0.0)]), np.array([sigma**2]), np.zeros(1)
-
     def made(each):
-        return Doubting(lambda second: 30.0 * (channel in each.doubted and second >= 20))
+        return Doubting(change, sigma, lambda second: 30.0 * (channel in each.doubted and second >= 20))
 
     named = [alarm.cause for alarm in taken(FaultTwins(load_scene(), made, SETTINGS), 40)]
     assert named == [f"{channel}.sensor"] * is_named
+
+
+@pytest.mark.parametrize(("gain", "named"), [(0.0, ["cylinder_2.k"]), (30.0, [])])
+def test_a_cause_of_uncertain_size_keeps_its_probability(gain, named):
+    """A force sensor 4 kN off, too little for a name, explains more than the spring does. So the spring is not named either."""
+
+    def made(each):
+        late = 100.0 * len(each.delays)
+        rate = gain * ("cylinder_force_2" in each.doubted)
+        return Doubting(
+            4e3, 1e2, lambda second: (second >= 20) * rate - late, lambda second: (second >= 20) * spring(each, 0.3) / 2
+        )
+
+    assert [alarm.cause for alarm in taken(FaultTwins(load_scene(), made, SETTINGS), 50)] == named
 
 
 class Zeroed(Follower):
