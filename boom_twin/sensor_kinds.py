@@ -140,6 +140,7 @@ def imu_kind(stem: str, lack: str = "") -> SensorKind:
 
 
 TIP_IMU = imu_kind("tip_imu", lack="there are no residuals of the tip's acceleration (optional)")
+IMU_2, IMU_3, IMU_4 = map(imu_kind, ("imu_2", "imu_3", "imu_4"))
 
 
 def gyro_kind(imu: SensorKind) -> SensorKind:

@@ -10,7 +10,20 @@ from math import pi
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from .predictions import Estimate, Prediction
-from .sensor_kinds import ANGLES, FORCES, MOMENTS, PRESSURES, STROKES, TIP_IMU, SensorKind, gyro_kind, imu_kind, point_kind
+from .sensor_kinds import (
+    ANGLES,
+    FORCES,
+    IMU_2,
+    IMU_3,
+    IMU_4,
+    MOMENTS,
+    PRESSURES,
+    STROKES,
+    TIP_IMU,
+    SensorKind,
+    gyro_kind,
+    point_kind,
+)
 from .texts import alarm_text
 
 if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
@@ -109,12 +122,12 @@ SENSORS: dict[Stream, SensorKind] = {
     Stream.IMU: TIP_IMU,
     Stream.FORCES: FORCES,
     Stream.RATE: gyro_kind(TIP_IMU),
-    Stream.IMU_2: imu_kind("imu_2"),
-    Stream.RATE_2: gyro_kind(imu_kind("imu_2")),
-    Stream.IMU_3: imu_kind("imu_3"),
-    Stream.RATE_3: gyro_kind(imu_kind("imu_3")),
-    Stream.IMU_4: imu_kind("imu_4"),
-    Stream.RATE_4: gyro_kind(imu_kind("imu_4")),
+    Stream.IMU_2: IMU_2,
+    Stream.RATE_2: gyro_kind(IMU_2),
+    Stream.IMU_3: IMU_3,
+    Stream.RATE_3: gyro_kind(IMU_3),
+    Stream.IMU_4: IMU_4,
+    Stream.RATE_4: gyro_kind(IMU_4),
     Stream.MOMENTS: MOMENTS,
     Stream.POINT: point_kind("points"),
     Stream.POINT_2: point_kind("points_2"),

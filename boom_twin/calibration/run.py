@@ -114,7 +114,7 @@ def calibrate(
 
     The last session is held out; of a single one, its last third. `settings` give the noise of the sensors. `mapping` is by
     default that of the sessions. `progress` is told the share done and what comes next. `window` is the part of each session
-    that is used. `namespace` is that of the node in the sessions.
+    that is used. `namespace` is the ROS namespace of the recorded topics.
 
     Raises
     ------

@@ -286,7 +286,7 @@ class FaultSearch:
             return None
         spread = math.hypot(found.spread, usual)
         is_known = abs(found.size) > self._certain * spread and found.agreement > math.sqrt(2.0 * sure)
-        begun = [second.stamp for second in self._maker.recent][-self._age :][found.onset]
+        begun = list(self._maker.recent)[-self._age :][found.onset].stamp
         return (fault._replace(size=found.size), spread, begun, found.probability) if is_known else None
 
     def _course(self, fault: Fault) -> Array:

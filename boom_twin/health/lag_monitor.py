@@ -65,15 +65,13 @@ class LagMonitor:
 
     def _judge(self, end: int) -> list[Alarm]:
         """Begin and end alarms by the present lags."""
-        found = {stream: _lag(means) for stream, means in self._means.items()}
-        lags = {stream: lag for stream, (lag, _) in found.items()}
-        begun = {stream: start for stream, (_, start) in found.items()}
+        lags = {stream: _lag(means) for stream, means in self._means.items()}
         late = {stream: lag for stream, lag in lags.items() if lag.left < CLEAR and _exceeds(lag)}
         if late and max(late.values()).lag < 0.0:
             surest = min(late.values(), key=lambda lag: lag.sigma)
             if not any(_exceeds(lag._replace(lag=lag.lag - surest.lag)) for lag in lags.values()):
-                begun[self._drive] = min(begun[stream] for stream in late)
-                late = {self._drive: surest._replace(lag=-surest.lag)}
+                since = min(lag.since for lag in late.values())
+                late = {self._drive: surest._replace(lag=-surest.lag, since=since)}
         self._newest = late[self._drive].lag if self._drive in late else self._newest
         near = {stream for stream, lag in lags.items() if abs(lag.lag) + SIGMAS * lag.sigma < LEAST}
         if near == lags.keys():
@@ -82,7 +80,7 @@ class LagMonitor:
         for stream, lag in late.items():
             if stream not in self._alarms:
                 name, evidence = stream.value, change_text(1e3 * lag.lag, "ms", 1e3 * lag.sigma)
-                self._alarms[stream] = Alarm(name, "late", begun[stream], None, f"{name}.delay", evidence)
+                self._alarms[stream] = Alarm(name, "late", lag.since, None, f"{name}.delay", evidence)
                 news.append(self._alarms[stream])
         return news
 
@@ -91,13 +89,13 @@ def _exceeds(lag: Lag) -> bool:
     return abs(lag.lag) > max(LEAST, SIGMAS * lag.sigma)
 
 
-def _lag(means: deque[tuple[int, Array]]) -> tuple[Lag, int]:
-    """Return the lag of the window that a lag explains best, by the channels with all readings, and its start (ns)."""
+def _lag(means: deque[tuple[int, Array]]) -> Lag:
+    """Return the lag of the window that a lag explains best, by the channels with all readings."""
     stamps, kept = map(np.array, zip(*means, strict=True))
-    found = [(Lag(0.0, np.inf), int(stamps[-1]))]
+    found = list[Lag]()
     for count in WINDOWS:
         newest = kept[-count:]
         newest = newest[:, :, np.isfinite(newest).all(axis=(0, 1))]
         if newest.size:
-            found.append((lag_near(stamps[-count:], *newest.swapaxes(0, 1)), int(stamps[-count:][0])))
-    return min(found, key=lambda each: (each[0].left, each[0].sigma))
+            found.append(lag_near(stamps[-count:], *newest.swapaxes(0, 1)))
+    return min(found, key=lambda lag: (lag.left, lag.sigma), default=Lag(0.0, np.inf))

@@ -107,12 +107,14 @@ FLOOR = 1e-3  # s, standard deviation of a lag by model errors
 class Lag(NamedTuple):
     """Lag of a stream and standard deviation, s. `sigma` is infinite if no lag is found.
 
-    left : squared residual with the lag, relative to that without, both beside the expected variance.
+    left : squared residual with the lag, relative to that without, both beside the expected variance. since : stamp (ns) of
+    the first reading that it was found from.
     """
 
     lag: float
     sigma: float
     left: float = 1.0
+    since: int = 0
 
 
 def lag_of(stamps: NDArray[np.int64], read: Array, expected: Array, variances: Array) -> Lag:
@@ -151,7 +153,7 @@ def lag_near(stamps: NDArray[np.int64], read: Array, expected: Array, variances:
     if abs(lag) > LONGEST or (abs(lag) > COARSE and share > CLEAR):
         return Lag(0.0, math.inf)
     scatter = math.sqrt(float(((by - change * weight) ** 2).sum())) / float(weight.sum())
-    return Lag(lag, math.hypot(scatter, FLOOR), share)
+    return Lag(lag, math.hypot(scatter, FLOOR), share, int(stamps[0]))
 
 
 class _Residuals:
