@@ -107,7 +107,7 @@ class SensorCheck:
             sigma=sigma,
             steps=np.full(count, math.inf),
             resolution=resolution,
-            lately=np.array([(math.inf, stated2, stated2)], LATELY),
+            lately=np.array([(math.inf, stated2, stated2, False)], LATELY),
             low=low - margin,
             high=high + margin,
             heard=np.full(count, np.nan),

@@ -97,6 +97,8 @@ def examine(sensors, start, end, masked, share, is_predicted, fastest):
     largest = survey(sensors, stamps, raw, left)
     interval = (stamps[last - 1] - stamps[BEFORE - 1]) * NANO / (last - BEFORE)
     is_motion = fastest > 0.0 and JERK * interval**3 > NOISY * math.sqrt(sensors.stated)  # which bends readings so much
+    if not is_motion and is_noisy(sensors):
+        sensors.lately[0].is_live = True
     is_known = end * NANO - sensors.lately[0].first > NOISY_WINDOW and not is_motion  # how noisy the sensors are
     find(sensors, stamps, raw, left, largest, end * NANO, is_known, fastest)
     remove(sensors, 0, last - BEFORE)
@@ -106,11 +108,11 @@ def examine(sensors, start, end, masked, share, is_predicted, fastest):
 @inner
 def is_any(sensors):
     """Return True if there is a finding."""
+    found = False
     for i in range(sensors.jumped.shape[0]):
         for kind in range(sensors.flags.shape[0]):
-            if sensors.flags[kind, i] or sensors.jumped[i] != 0.0:
-                return True
-    return False
+            found = found or sensors.flags[kind, i] or sensors.jumped[i] != 0.0
+    return found
 
 
 @inner
@@ -134,13 +136,14 @@ def find(sensors, stamps, raw, left, largest, now, is_known, fastest):
     the sensors are. For `fastest` see `examine`.
     """
     power, count, flags, jumped = sensors.power, stamps.shape[0], sensors.flags, sensors.jumped
-    live, newest = is_any_live(sensors), stamps[count - 1] * NANO
+    newest = stamps[count - 1] * NANO
     for i in range(power.shape[0]):
         is_spiky = False
         if largest > OUTLIER * math.sqrt(sensors.stated):
             least = OUTLIER * noise_of(sensors, stamps, left, i)
             is_spiky, jumped[i] = has_spikes(stamps, left, i, least), jump(stamps, raw, left, i, least, fastest)
-        flags[STUCK, i] = live and newest - sensors.since[i] >= REPEATS_FOR and sensors.run[i] >= most_repeats(sensors, i)
+        is_old = sensors.lately[0].is_live and newest - sensors.since[i] >= REPEATS_FOR
+        flags[STUCK, i] = is_old and sensors.run[i] >= most_repeats(sensors, i)
         flags[IS_NOISY, i] = is_known and power[i] > loud(sensors, i)
         flags[SPIKES, i] = is_known and is_spiky
         flags[SILENT, i] = now - sensors.heard[i] > SILENT_FOR or sensors.missing[i] > MISSING
@@ -175,13 +178,12 @@ def readings_of_frozen(sigma, resolution, false_alarm):
 
 
 @inner
-def is_any_live(sensors):
-    """Return True if a channel of several is alive with noise."""
-    power, least = sensors.power, QUIET * math.sqrt(sensors.stated)
-    live = False
-    for i in range(power.shape[0] if power.shape[0] > 1 else 0):
-        live = live or power[i] > least * least
-    return live
+def is_noisy(sensors):
+    """Return True if a channel shows noise. A stream that never has gives clean readings, which repeat while the boom rests."""
+    found = False
+    for i in range(sensors.power.shape[0]):
+        found = found or sensors.power[i] > QUIET * QUIET * sensors.stated
+    return found
 
 
 @inner

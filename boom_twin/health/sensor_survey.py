@@ -37,8 +37,8 @@ class SlowMeans(NamedTuple):
     weight: Array
 
 
-LATELY = np.dtype([("first", float), ("noise", float), ("lasting", float)])
-"""Time (s) of the first reading; usual variance of the noise, now and averaged."""
+LATELY = np.dtype([("first", float), ("noise", float), ("lasting", float), ("is_live", bool)])
+"""Time (s) of the first reading; usual variance of the noise, now and averaged; whether a sensor has shown noise."""
 BEFORE = 3  # readings before a block that `survey` and `find` take with it
 ROWS, TAKEN = range(2)  # places of `CheckWork.counts`
 STUCK, IS_NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of `CheckWork.flags`

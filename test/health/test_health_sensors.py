@@ -108,6 +108,22 @@ def test_stuck():
     only(stream.found(10, change=change), "stuck", 2, 1.0)
 
 
+def test_all_stuck():
+    """As of a driver that sends its last message again and again. They had noise before."""
+    stream, last = started(1), []
+
+    def change(times, raw):
+        last.append(raw[0].copy())
+        raw[:] = last[0]
+        return raw
+
+    assert set(stream.found(10, motion=lambda times: np.full_like(times, 0.3), change=change)) >= {
+        ("stuck", i) for i in range(4)
+    }
+    found = [stream.look(motion=lambda times: np.full_like(times, 0.3), change=change) for _ in range(100)]
+    assert all(each.flags["stuck"].all() for each in found)
+
+
 @pytest.mark.parametrize("times", [3.5, 5.0, 10.0])
 def test_noisy(times):
     """Much noise looks like spikes and jumps, too; of this sensor alone."""
