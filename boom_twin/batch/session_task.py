@@ -98,6 +98,7 @@ class SessionTask:
     scene: str | None
     params: str | None
     mapping: str | None
+    namespace: str
     report: bool  # is to be written, with its pictures
     keep_bag: bool  # of the replay
     time: float  # limit, s
@@ -130,9 +131,9 @@ def row_of(task: SessionTask) -> Row:
     from ..system.result_folder import REPLAY, result_folder
 
     session, params = Path(task.session), None if task.params is None else Path(task.params)
-    scene, settings = scene_of(session, task.scene), settings_of(session, params).settings
+    scene, settings = scene_of(session, task.scene), settings_of(session, params, task.namespace).settings
     window = TimeWindow(task.start, task.duration)
-    options = ReplayOptions(mapping=task.mapping, window=window)
+    options = ReplayOptions(mapping=task.mapping, window=window, namespace=task.namespace)
     with result_folder(Path(task.out), REPLAY, [session]) as building:
         found = evaluated_replay(building, session, scene, settings, options, category=task.fatigue)
         if task.report:
@@ -168,7 +169,7 @@ def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: Tim
     from ..calibration.run import BETWEEN, calibrate
 
     try:
-        found = calibrate([task.session], scene, None, settings, task.mapping, window=window)
+        found = calibrate([task.session], scene, None, settings, task.mapping, window=window, namespace=task.namespace)
     except BoomTwinError as error:
         return {"calibration_reason": str(error).replace("\n", " ")}
     row: Row = {"calibration_misfit": found.misfit, "calibration_remarks": "; ".join(found.remarks)}
