@@ -13,6 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from .. import __version__
+from ..analysis.posture_modes import MODE_DISTANCE
 from ..analysis.sample_series import Vibration
 from ..offline.history import course
 from ..offline.recording import Recording, noise_told
@@ -26,7 +27,7 @@ from ..types import SECOND, SENSORS, Stream
 from .evaluation import Evaluation
 from .fatigue import LIVES, NOISE_RANGE, hours_as_text, hours_to_end, yearly_as_text
 from .quantities import Load
-from .vibration import MODE_DISTANCE, SHORTEST_REST
+from .vibration import SHORTEST_REST
 
 FILE_NAME = "report.html"
 HOUR = 3600.0  # s
