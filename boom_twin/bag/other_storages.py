@@ -150,12 +150,12 @@ class Ros1File(SessionFile):
 def summarise_ros1(path: Path) -> Ros1File:
     """Return the content of one file, which must have an index; see `boom_twin.bag.reader.summarise`."""
     with _reader(path) as reader:
-        connections = reader.connections
+        connections, names = reader.connections, dict[Any, str]((unpack, name) for name, unpack in _BOUNDED.items())
         return Ros1File(
             path=path,
             storage="ros1",
             library="ROS 1",
-            compression=_compression(reader),
+            compression=next((names.get(chunk.decompressor, "none") for chunk in reader.chunks.values()), "none"),
             channels={each.id: channel_of(each.id, each.topic, _encoding(each)) for each in connections},
             schemas={each.id: schema_of(each.id, each.msgtype) for each in connections},
             counts={each.id: each.msgcount for each in connections},
@@ -172,11 +172,6 @@ def _encoding(connection: Connection) -> str:
         return ENCODING
     is_known = all(name in jazzy().fielddefs for name in found.keys() - set(_OWN))
     return CDR if is_known and not {*other_than_jazzy(found)} - set(_OWN) else ENCODING
-
-
-def _compression(reader: Any) -> str:
-    names = {unpack: name for name, unpack in _BOUNDED.items()}
-    return next((names.get(chunk.decompressor, "none") for chunk in reader.chunks.values()), "none")
 
 
 def _unpack(decompressor: Callable[[], Any], data: bytes) -> bytes:

@@ -54,14 +54,9 @@ class Commissioning:
         return [verdict for verdict in self.checked.verdicts if verdict.is_wrong]
 
     @property
-    def late(self) -> dict[Stream, Lag]:
-        """Streams whose lag is proposed as a delay."""
-        return {stream: lag for stream, lag in self.lags.items() if is_late(lag)}
-
-    @property
     def has_proposal(self) -> bool:
         """Return True if a mapping is proposed."""
-        return bool(self.late) or bool(self.absent) or any(verdict.is_sure for verdict in self.wrong)
+        return any(map(is_late, self.lags.values())) or bool(self.absent) or any(verdict.is_sure for verdict in self.wrong)
 
 
 def wiring_of(

@@ -87,7 +87,9 @@ class HistoryBuilder:
     def add(self, stretch: Stretch) -> History:
         """Add the next stretch; return the history of it alone, with all its rows."""
         own = _stretch_history(stretch, self._scene, self._plan)
-        self._note_peak(own)
+        size = np.hypot(*own.tip_acceleration.T)
+        if np.isfinite(size).any() and float(np.nanmax(size)) > self._peak:
+            self._peak, self._peak_at = float(np.nanmax(size)), float(own.stamps_s[np.nanargmax(size)])
         self._distributions.add(own)
         width = stretch.length / BINS if stretch.length > LONGEST_WHOLE else 0.0
         estimated = dict(zip(ESTIMATED, vars(_estimate_trace(stretch)).values(), strict=True))
@@ -100,11 +102,6 @@ class HistoryBuilder:
             if not self._shapes or abs(shape[0] - self._shapes[-1][0]) >= width:
                 self._shapes.append(shape)
         return own
-
-    def _note_peak(self, own: History) -> None:
-        size = np.hypot(*own.tip_acceleration.T)
-        if np.isfinite(size).any() and float(np.nanmax(size)) > self._peak:
-            self._peak, self._peak_at = float(np.nanmax(size)), float(own.stamps_s[np.nanargmax(size)])
 
     def _put(self, key: str, columns: dict[str, Array], names: Sequence[str], width: float) -> None:
         """Keep rows: if bins have a `width` (s), those with extremes of the columns `names`, and those about the peak."""
