@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -25,7 +25,6 @@ from ..system.processes import python_command
 
 if TYPE_CHECKING:
     from ..bag.session_file import TimeWindow
-    from ..bag.session_model import SessionScene
     from ..config.settings import Settings
     from ..scene.schema import Scene
 
@@ -146,7 +145,8 @@ def row_of(task: SessionTask) -> Row:
     row |= {name: value for name, value in summary.items() if name not in ("events", "alarms")}
     row |= {
         "file_sha256": files_sha256(result.session),
-        "rig": _rig(result.session.notes, scene),
+        # by its note, else by description and digest of its scene
+        "rig": result.session.notes.get("rig", "").strip() or f"{found.scene.description} scene {scene.sha256[:12]}".strip(),
         "report": task.report,
         "alarms": [{name: alarm[name] for name in ALARM} for alarm in summary["alarms"]],
         "events": [{"event": name, "count": count} for name, count in summary["events"].items()],
@@ -157,11 +157,6 @@ def row_of(task: SessionTask) -> Row:
         row |= {"fatigue_category_MPa": task.fatigue, "section_heights_given": found.has_heights}
         row |= {f"fatigue_damage_{each.station.key}": each.damage for each in found.fatigue}
     return row | (_calibrated(task, scene.scene, settings, window) if task.calibrate else {})
-
-
-def _rig(notes: Mapping[str, str], scene: SessionScene) -> str:
-    """Return the name of a session's rig: its note ``rig``, else description and digest of its scene."""
-    return notes.get("rig", "").strip() or f"{scene.scene.description} scene {scene.sha256[:12]}".strip()
 
 
 def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: TimeWindow) -> Row:
