@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..messages.cdr_decoder import Integers, MessageBlock, has_header, stamp_in
+from ..messages.cdr_decoder import MessageBlock, has_header, stamp_in
 from ..messages.type_store import jazzy
-from ..types import NANO, Array
+from ..types import NANO, Array, Integers
 from .reader import Session, scan
 from .session_file import CDR, MOST_TOGETHER, WHOLE, SessionBlocks, SessionFile, TimeWindow, schema_of
 

@@ -21,8 +21,9 @@ from mcap.summary import Summary
 from numpy.typing import NDArray
 
 from ..errors import BagError
-from ..messages.cdr_decoder import Integers, MessageBlock, by_log_time, gather
+from ..messages.cdr_decoder import MessageBlock, by_log_time, gather
 from ..system.files import open_received
+from ..types import Integers
 from .mcap_records import (
     HEADS,
     LARGEST_SUMMARY,

@@ -24,9 +24,9 @@ from rosbags.serde import SerdeError
 from zstandard import ZstdError
 
 from ..errors import BagError, UsageError
-from ..messages.cdr_decoder import CdrDecoder, Integers, MessageBlock, by_log_time, joined
+from ..messages.cdr_decoder import CdrDecoder, MessageBlock, by_log_time, joined
 from ..messages.type_store import decode, jazzy
-from ..types import NANO
+from ..types import NANO, Integers
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,14 +12,13 @@ from ..config.settings import Settings
 from ..deviation.named_faults import FaultyBoom
 from ..scene.edit import loaded
 from ..scene.schema import Scene
-from ..types import SECOND, SENSORS, Alarm, Array, Channel, Health, Mount, Place, Stream, StrokeReading
+from ..types import SECOND, SENSORS, Alarm, Array, Channel, Health, Integers, Mount, Place, Stream, StrokeReading
 from .deviations import SIGMAS, DeviationMonitor, TipLoadMonitor
 from .fault_twins import FaultTwins
 from .faults import Fault, explains, hypothesis
 from .lag_monitor import LagMonitor
 from .sensor_check import BLOCK, NOISE_OVER, Block, SensorCheck, SensorFindings, sensor_ranges
 from .sensor_monitor import SensorMonitor
-from .sensor_survey import Integers
 from .wiring_monitor import WiringMonitor
 
 PERIOD = SECOND  # ns between two `Health` without news

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.schema import Scene
-from ..types import GIVE, NANO, Array, Mount, Stream, channels_of
+from ..types import GIVE, NANO, Array, Integers, Mount, Stream, channels_of
 from .sensor_findings import HAS_FINDING, IS_BENT, collect, examine
-from .sensor_survey import BEFORE, LATELY, ROWS, TAKEN, CheckWork, Integers, SlowMeans
+from .sensor_survey import BEFORE, LATELY, ROWS, TAKEN, CheckWork, SlowMeans
 
 Flags = NDArray[np.bool_]
 

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.jit import by_reference, inner
-from ..types import NANO, Array
-
-Integers = NDArray[np.int64]
+from ..types import NANO, Array, Integers
 
 NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
 USUAL_WINDOW = 10.0  # s over which the noise that is usual is told

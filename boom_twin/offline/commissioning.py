@@ -16,7 +16,6 @@ from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import SessionScene, mapping_of, mapping_text, scene_of, settings_of, strokes_of
 from ..config.yaml_text import plain
 from ..errors import BagError, UsageError
-from ..messages.cdr_decoder import Integers
 from ..messages.mapping import NO_LAG, mapping_from
 from ..messages.topic_table import Sensor, Topics, usual
 from ..scene.edit import loaded
@@ -24,7 +23,7 @@ from ..scene.load import SceneSource
 from ..scene.schema import Scene
 from ..twin.blocks import CODES, SampleBlock
 from ..twin.twin import Twin
-from ..types import SENSORS, Array, Channel, Place, Stream, StrokeReading
+from ..types import SENSORS, Array, Channel, Integers, Place, Stream, StrokeReading
 from ..wiring.check import ABSENT, STROKES_ALONE, Checked, Verdict, check, finding, likely, reading
 from ..wiring.hypotheses import SLACK, si
 from ..wiring.readings import Lag, RestModel, Series, Window, is_checked, lag_of

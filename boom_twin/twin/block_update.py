@@ -12,13 +12,12 @@ from ..deviation.predictor import BoomPredictor, Drawn
 from ..health.monitor import HealthMonitor
 from ..kernels.result_row import PIN
 from ..predictions import Outline
-from ..types import Health, Report, Residuals, Stream
+from ..types import Health, Integers, Report, Residuals, Stream
 from .blocks import (
     CODES,
     REGULAR,
     STREAMS,
     EstimateBlock,
-    Integers,
     Note,
     PredictionBlock,
     ReportBlock,
