@@ -165,7 +165,7 @@ def likelihood_cost(found: Array) -> float:
 
 
 MOST = 12  # passes
-CLOSE = 0.1  # of the deviation of each estimate, by which the last pass may move it
+CLOSE = 0.05  # change of log likelihood by a whole step, below which both ends fit equally well
 
 
 @dataclass(frozen=True)
@@ -216,7 +216,7 @@ def bounded_minimum(precision: Array, pull: Array, least: Array) -> Array:
 
 def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callable[[int], None]) -> Fit:
     """Return the fit; `assumed` are parameters taken to be known, `tell` is given the number of each pass before it."""
-    at, stated, furthest, learning = problem.start(), problem.sensor_noise(), np.inf, True
+    at, stated, change, learning = problem.start(), problem.sensor_noise(), np.inf, True
     for passes in range(1, MOST + 1):
         tell(passes)
         if learning:
@@ -225,29 +225,32 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callab
         slopes = problem.slopes(at, noise)
         score, information = _score(slopes, base)
         precision, pull = information + np.eye(len(at)), score.sum(axis=1) - at
-        if furthest < CLOSE or passes == MOST:
+        if change < CLOSE or passes == MOST:
             break
         step = bounded_minimum(precision, pull, problem.least - at)
-        furthest = float((np.abs(step) / np.sqrt(np.diag(np.linalg.inv(precision)))).max())
-        step /= max(1.0, float(np.abs(step).max()))  # one deviation of a prior at most
-        at = at + _shortened(problem, at, step, noise, base)
-        if learning and furthest < 1.0:  # near enough to learn the noise for the last time
+        longest = max(1.0, float(np.abs(step).max()))
+        step, change = _shortened(problem, at, step / longest, noise, base)  # one deviation of a prior at most
+        at, change = at + step, change if longest == 1.0 else np.inf
+        if learning and change < 0.5:  # within a standard deviation: near enough to learn the noise for the last time
             noise = problem.noise(at, np.maximum(stated, stated * _mean_squares(problem, base)))
             learning = False
     sums = np.array([np.bincount(problem.blocks, row) for row in score])
     by_model = _together(slopes, problem.slopes_by_model(at, assumed, noise, base), base)
     misfits = np.sqrt(_mean_squares(problem, base) * noise.channels / stated)
-    return Fit(at, information, sums @ sums.T, pull, by_model, misfits, passes, furthest < CLOSE)
+    return Fit(at, information, sums @ sums.T, pull, by_model, misfits, passes, change < CLOSE)
 
 
-def _shortened(problem: CalibrationProblem, at: Array, step: Array, noise: Noise, base: Array) -> Array:
-    before = likelihood_cost(base) + 0.5 * at @ at
-    for _ in range(5):
+def _shortened(problem: CalibrationProblem, at: Array, step: Array, noise: Noise, base: Array) -> tuple[Array, float]:
+    """Return a step, halved until it fits no worse, and how much the whole step changes the log posterior."""
+    before, whole = likelihood_cost(base) + 0.5 * at @ at, np.inf
+    for halvings in range(5):
         (found,) = problem.innovations([problem.values(at + step)], noise)
-        if likelihood_cost(found) + 0.5 * (at + step) @ (at + step) <= before:
+        change = float(likelihood_cost(found) + 0.5 * (at + step) @ (at + step) - before)
+        whole = whole if halvings else abs(change)
+        if change <= 0.0:
             break
         step = 0.5 * step
-    return step
+    return step, whole
 
 
 def _mean_squares(problem: CalibrationProblem, base: Array) -> Array:

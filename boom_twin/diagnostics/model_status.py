@@ -13,7 +13,7 @@ from ..analysis.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms, repeated, values_of
 from ..health.deviations import KIND as DEVIATION
 from ..health.sensor_monitor import noise_as_text
-from ..types import SECOND, Alarm, Array, Health, Report
+from ..types import SECOND, Alarm, Array, Health, Report, Stream
 from .levels import Bounds, ComponentJudge, Level, Status, Value
 
 FAILURE_SHOWN = 1.0  # time (s) for which a failure is shown
@@ -263,9 +263,10 @@ class HealthWatch:
         alarms = (alarm for alarm in self._alarms.lasting if alarm.channel == channel)
         return next(((_level_of(alarm), alarm.told) for alarm in alarms), None)
 
-    def of_sensor(self, channel: str) -> tuple[Level, str] | None:
-        """Return level and words of the active alarm that blames the sensor of a channel; None without one."""
-        alarms = (alarm for alarm in self._alarms.lasting if alarm.channel == channel and alarm.cause == f"{channel}.sensor")
+    def of_sensor(self, channel: str, stream: Stream) -> tuple[Level, str] | None:
+        """Return level and words of the active alarm that blames the sensor of a channel, or its stream; None without one."""
+        blamed = f"{channel}.sensor", f"{stream.value}.sensor"
+        alarms = (alarm for alarm in self._alarms.lasting if alarm.cause in blamed)
         return next(((_level_of(alarm), alarm.told) for alarm in alarms), None)
 
     @property

@@ -127,7 +127,7 @@ class TwinWatch:
         sensors, longest = list[Status](), self.thresholds.gap_warn
         for stream, watch in self._streams.items():
             for sensor, stats in zip(self._sensors[stream], watch.look(longest), strict=True):
-                alarm = None if self.health is None else self.health.of_sensor(sensor.name)
+                alarm = None if self.health is None else self.health.of_sensor(sensor.name, stream)
                 sensors.append(sensor_status(judge(f"sensor {sensor.name}"), sensor, stats, watch.age_of(stats, at.now), alarm))
         strokes = self._streams[self._drive].lag
         for stream, watch in self._streams.items():

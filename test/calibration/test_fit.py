@@ -104,3 +104,19 @@ def test_a_step_that_had_to_be_shortened_is_no_end() -> None:
     found = fitted(problem, (), lambda passes: None)
     (left,) = problem.innovations([problem.values(found.deviations)], None)
     assert found.is_settled == (abs(left[:, 0]).max() < 3.0), (found, left[0])
+
+
+def test_a_fit_is_settled_where_a_whole_step_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Derivatives are off by so much that every step is a quarter of a deviation, which changes the log likelihood by 0.03."""
+    problem, slopes = Bent(), Bent.slopes
+    problem.bend = 0.0
+    best = fitted(problem, (), lambda passes: None).deviations
+
+    def biased(self, deviations, noise):
+        (base,) = self.innovations([self.values(deviations)], noise)
+        return slopes(self, deviations, noise) + np.array([0.0, 0.5])[:, None, None] * base[:, :1] / 40.0 * [1.0, 0.0]
+
+    monkeypatch.setattr(Bent, "slopes", biased)
+    monkeypatch.setattr(Bent, "start", lambda self: best)
+    found = fitted(problem, (), lambda passes: None)
+    assert found.is_settled and found.passes == 2 and found.deviations == pytest.approx(best, abs=0.05)

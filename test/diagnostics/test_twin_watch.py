@@ -120,6 +120,9 @@ def test_an_alarm_of_a_sensor_is_told_with_the_sensor_while_it_lasts(rig: Rig) -
         found = rig.second()
         assert (found["sensor cylinder_2"].level, found["sensor cylinder_2"].message) == (level, words)
         assert found["sensor joint_1"].level == Level.OK
+    rig.watch.judged(Health(2, (replace(alarm, channel="joint_angles", cause="joint_angles.sensor"),), np.zeros(2), {}), 0.0)
+    levels = {name: each.level for name, each in rig.second().items() if name.startswith("sensor ")}
+    assert [name for name, level in levels.items() if level == Level.ERROR] == [f"sensor joint_{i}" for i in (1, 2, 3, 4)]
 
 
 @pytest.mark.parametrize(("swing", "level"), [(0.1, Level.OK), (0.2, Level.WARN), (0.4, Level.ERROR)])
