@@ -2,7 +2,7 @@
 
 The filter of a twin gives its innovations and the log likelihood of all readings (`BoomPredictor.evidence`). A fault twin has a
 scene with one fault, or lets a sensor's zero drift. `causes` decides which fault is probable. Further twins find its size. A
-named fault becomes part of the boom as believed. So a second fault, and the end of the first, are found in the same way.
+named fault becomes part of the boom as believed since its onset. So a second fault is found in the same way.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ SETTLING = 2  # s after a start without verdicts: the filters settle on vibratio
 class EndTest:
     """Test for the end of a named fault, by twins of the boom as believed and of that boom without the fault.
 
-    A twin learns zeros and a load that fit its boom. What it learned before an end misleads it afterwards. So both twins start
-    anew, `SETTLING` before each second, until the boom without the fault is likelier since their start (E. Page, Biometrika 41
-    (1954), 100-115).
+    A twin learns zeros and a load that fit its boom. What it learned before an end misleads it afterwards. So each second both
+    twins restart from the `SETTLING` seconds before, until the boom without the fault is likelier since their start (E. Page,
+    Biometrika 41 (1954), 100-115).
     """
 
     def __init__(self, maker: TwinMaker, known: tuple[Fault, ...], fault: Fault) -> None:
