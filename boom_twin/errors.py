@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from .system.terminal_text import printable
+from .system.terminal_text import printable, several
 
 
 class BoomTwinError(Exception):
@@ -85,8 +85,7 @@ def bound_of(message: str) -> str:
 
 def listed(source: str, faults: Sequence[Fault]) -> str:
     """Return the text of an error that lists the faults of a file."""
-    count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
-    return "\n".join([f"{source}: {count}", *(f"  {fault}" for fault in faults)])
+    return "\n".join([f"{source}: {several(len(faults), 'fault')}", *(f"  {fault}" for fault in faults)])
 
 
 class SceneError(BoomTwinError):

@@ -31,9 +31,11 @@ if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
+    Integers = NDArray[np.int64]
     ComplexArray = NDArray[np.complex128]
 else:
     Array = Any
+    Integers = Any
     ComplexArray = Any
 
 

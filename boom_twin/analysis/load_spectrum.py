@@ -239,10 +239,3 @@ def _pulses_in_bins(places: NDArray[np.int64], loads: Array) -> Pulses | None:
     means = np.add.reduceat(loads, starts, axis=0) / counts[:, None]
     every = np.arange(bins[0], bins[-1] + 1)
     return find_pulses(np.stack([np.interp(every, bins, column) for column in means.T], axis=1), BIN)
-
-
-def tip_load(times: Array, loads: Array, variances: Array) -> TipLoad | None:
-    """Return the load in estimates (k, 2) in N with their variances at `times` (k,) in s; None without any."""
-    finder = TipLoadFinder()
-    finder.add(np.round(np.asarray(times) / NANO).astype(np.int64), np.asarray(loads, float), np.asarray(variances, float))
-    return finder.load

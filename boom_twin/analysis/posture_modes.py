@@ -18,6 +18,14 @@ from .modal import natural_modes
 MOVED = 0.005  # m of any stroke after which all is computed anew
 COUNT = 6
 
+MODE_DISTANCE = 0.2  # relative distance up to which a measured frequency belongs to a mode of the model
+
+
+def nearest_mode(frequency: float, model: Sequence[float]) -> int | None:
+    """Return the index of the mode of the model (frequencies in Hz) nearest to a measured one; None if none is near."""
+    mode = min(range(len(model)), key=lambda i: abs(model[i] - frequency), default=None)
+    return mode if mode is not None and abs(model[mode] - frequency) <= MODE_DISTANCE * model[mode] else None
+
 
 class ModeList:
     """Lowest `COUNT` natural frequencies (Hz) about the equilibrium; none where there is no equilibrium."""

@@ -15,6 +15,7 @@ from ..errors import BagError
 from ..messages.cdr_decoder import CdrDecoder
 from ..messages.sample_decoder import MOST_NAMES
 from ..messages.topic_table import Qos, Topic, Topics
+from ..system.terminal_text import several
 from ..types import NANO, SECOND, SENSORS, Stream
 from .inspect import BagInfo, Tally, spacing_faults
 from .metadata import profiles
@@ -192,7 +193,7 @@ def conflicts(session: Session, topics: Topics, joints: int, scene: str) -> Iter
         is_alone = topics.is_shared and len(lacking) == joints and own.issubset(named)
         yield (
             f"{topics.inputs[drive].absolute} never names {_listed(lacking)}, but {_listed(named)}; "
-            f"{_scene(scene)} has {_counted(joints, KINDS[drive])}. Give that of this boom by --scene, or its names by "
+            f"{_scene(scene)} has {several(joints, KINDS[drive])}. Give that of this boom by --scene, or its names by "
             "--mapping." + (f" {DRIVE_REMEDY}" if is_alone else "")
         )
 
@@ -201,7 +202,7 @@ def extra_names_message(topic: str, names: Collection[str], stream: Stream, join
     """Return the message, with remedy, for a topic that names cylinders or joints beyond those of the scene."""
     kind = KINDS[stream]
     return (
-        f"{topic} names {_listed(names)}; {_scene(scene)} has {_counted(joints, kind)}, so this is another boom. "
+        f"{topic} names {_listed(names)}; {_scene(scene)} has {several(joints, kind)}, so this is another boom. "
         f"Give its scene by --scene (the node: parameter scene), or a mapping whose sensors list every {kind} of this one."
     )
 
@@ -222,10 +223,6 @@ def _listed(names: Iterable[str]) -> str:
     names_told = 12  # limit for the number of names in a sentence
     first = list(dict.fromkeys(names))
     return ", ".join(first[:names_told]) + (f" and {len(first) - names_told} more" if len(first) > names_told else "")
-
-
-def _counted(number: int, kind: str) -> str:
-    return f"{number} {kind}{'s' if number > 1 else ''}"
 
 
 def _names_read(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[str, None]]:

@@ -27,7 +27,7 @@ from ..messages.topic_table import Topics, load_topics
 from ..system.files import open_received
 from ..types import NANO, SECOND, SENSORS, Array, Sample, Stream, channels_of, sensor_kind, stream_of
 from .metadata import dump
-from .session_file import IN_ORDER, LogClock, SessionFile, as_bag_error, channel_of, schema_of
+from .session_file import LogClock, SessionFile, as_bag_error, channel_of, schema_of
 from .session_model import SessionMetadata
 from .session_writer import LogTimes, named_message
 from .writer import MessageWriter
@@ -279,7 +279,7 @@ class CsvFile(SessionFile):
     readings: list[Readings]
     joints: int
 
-    def messages(self, clock: LogClock = IN_ORDER) -> Iterator[tuple[int, int, bytes]]:
+    def messages(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
         numbers = {channel.topic: channel.id for channel in self.channels.values()}
         for block in encoded_blocks(self.readings, load_topics(), self.joints):
             found = [(place, numbers[rows.key], data) for rows in block.rows for place, data in zip(*rows[1:], strict=True)]

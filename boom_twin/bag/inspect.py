@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from array import array
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from operator import attrgetter
+from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..messages.cdr_decoder import has_header, stamp_in
+from ..messages.cdr_decoder import MessageBlock, has_header, stamp_in
 from ..messages.type_store import jazzy
-from ..types import NANO
+from ..types import NANO, Array, Integers
 from .reader import Session, scan
-from .session_file import CDR, MOST_TOGETHER, WHOLE, SessionFile, TimeWindow, as_bag_error, schema_of
+from .session_file import CDR, MOST_TOGETHER, WHOLE, SessionBlocks, SessionFile, TimeWindow, schema_of
 
 
 def spacing_faults(stamps: NDArray[np.int64]) -> Iterator[str]:
@@ -62,7 +61,6 @@ class Tally:
 
     name: str
     type: str
-    stamped: bool  # messages have a header
     count: int = 0
     first: int = 0  # first, last: log times, ns
     last: int = 0
@@ -73,28 +71,30 @@ class Tally:
     stamps: array[int] = field(default_factory=lambda: array("q"))  # of messages with the sensors of the first
     _sensors: bytes = b""
     _skewed: int = 0  # messages whose log time is compared with their stamp
-    _skews: tuple[int, int, int] = (2**64, 0, -(2**64))  # least, sum and largest of log time minus stamp, ns
-    _before: int | None = None
+    _skews: tuple[float, float, float] = (inf, 0.0, -inf)  # least, sum and largest of log time minus stamp, ns
+    _newest: tuple[Integers, Integers] = (np.zeros(0, np.int64), np.zeros(0, np.int64))  # stamp and log time, once there is one
 
-    def add(self, log_time: int, data: bytes) -> None:
-        before_this, self.last = self.last, log_time
-        if self.count == 0:
-            self.first = log_time
-        self.count += 1
-        stamp: int | None = log_time
-        if self.stamped:
-            stamp = stamp_in(data)
-            if stamp:
-                self._compare(log_time - stamp)
-                sensors = data[SENSORS_IN]
-                self._sensors = self._sensors or sensors
-                # on a bus, each sensor has messages of its own
-                if sensors == self._sensors and len(self.stamps) < MOST_TOGETHER:
-                    self.stamps.append(stamp)
-            else:
-                self.unset += 1
-        if stamp:
-            self._step(stamp, before_this)
+    def add(self, block: MessageBlock, is_stamped: bool) -> None:
+        """Count messages, one or more, in the order of their log times. Messages that are stamped have a header."""
+        self.first, self.last = self.first if self.count else int(block.log_times[0]), int(block.log_times[-1])
+        self.count += len(block)
+        stamps = logs = block.log_times.astype(np.int64)
+        if is_stamped:
+            data = [block.data(row) for row in range(len(block))]
+            stamps = np.array([stamp_in(each) or 0 for each in data], np.int64)
+            own = np.flatnonzero(stamps)
+            self.unset += len(stamps) - len(own)
+            sensors = [data[row][SENSORS_IN] for row in own]
+            stamps, logs = stamps[own], logs[own]
+            self._compare((logs - stamps).astype(float))
+            self._sensors = self._sensors or next(iter(sensors), b"")
+            if len(self.stamps) < MOST_TOGETHER:  # on a bus, each sensor has messages of its own
+                self.stamps.frombytes(stamps[[each == self._sensors for each in sensors]].tobytes())
+        stamps, logs = (np.concatenate(pair) for pair in zip(self._newest, (stamps, logs), strict=True))
+        self._newest, steps = (stamps[-1:], logs[-1:]), np.diff(stamps)
+        self.not_increasing += int((steps <= 0).sum())
+        if steps.max(initial=0) > self.gap:
+            self.gap, self.gap_after = int(steps.max()), int(logs[steps.argmax()])
 
     @property
     def rate(self) -> float | None:
@@ -107,18 +107,10 @@ class Tally:
         least, total, most = self._skews
         return Skew(least * NANO, total * NANO / self._skewed, most * NANO) if self._skewed else None
 
-    def _step(self, stamp: int, log_before: int) -> None:
-        if self._before is not None:
-            if stamp <= self._before:
-                self.not_increasing += 1
-            elif stamp - self._before > self.gap:
-                self.gap, self.gap_after = stamp - self._before, log_before
-        self._before = stamp
-
-    def _compare(self, skew: int) -> None:
+    def _compare(self, skews: Array) -> None:
         least, total, most = self._skews
-        self._skews = min(least, skew), total + skew, max(most, skew)
-        self._skewed += 1
+        self._skews = skews.min(initial=least), total + skews.sum(), skews.max(initial=most)
+        self._skewed += len(skews)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,19 +119,15 @@ class BagInfo:
 
     session: Session
     tallies: tuple[Tally, ...]  # sorted by the name of the topic
-    library: str  # program that wrote the first file, by its own name
-    compression: str  # compression of the chunks: ``zstd``, ``lz4``, ``none``, ..; or a note that the file has no chunks
-    size: int  # size of all files, bytes
     window: TimeWindow = WHOLE  # part of the session that the tallies count
 
     @property
     def span(self) -> tuple[int, int]:
-        """Log times (ns) of the first and last message in the window; its beginning for both if empty."""
+        """Log times (ns) of the first and last message in the window."""
         if self.window == WHOLE:
             return self.session.start, self.session.end
-        seen = [tally for tally in self.tallies if tally.count]
-        begin = self.window.bounds(self.session.start)[0]
-        return min((tally.first for tally in seen), default=begin), max((tally.last for tally in seen), default=begin)
+        seen = [tally for tally in self.tallies if tally.last]
+        return min(tally.first for tally in seen), max(tally.last for tally in seen)
 
     @property
     def synthetic(self) -> bool | None:
@@ -153,36 +141,25 @@ class BagInfo:
 
 
 def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
-    """Read a session once and return the statistics of its messages in the window.
+    """Read a session once and return the statistics of its messages in the window; of others than CDR only their number.
 
-    The window counts from the first message of the session. Raise BagError if there is no session, or it is damaged.
+    The window counts from the first message of the session. Raise BagError if there is no session, it is damaged, or no message
+    is in the window.
     """
     session = scan(path)
-    tallies = {topic.name: Tally(topic.name, topic.type, False) for topic in session.topics}
-    files = sorted(session.files, key=attrgetter("start"))
-    for file in files:
-        _count(file, tallies, window.bounds(session.start))
-    size = sum(file.path.stat().st_size for file in files)
-    return BagInfo(session, tuple(tallies.values()), files[0].library, files[0].compression, size, window)
-
-
-def _count(file: SessionFile, tallies: dict[str, Tally], bounds: tuple[int, int]) -> None:
-    """Count the messages of a file within the `bounds` of log time; check the counts of the whole file."""
-    own = {key: tallies[channel.topic] for key, channel in file.channels.items()}
-    passed_over = set()
-    for key, channel in file.channels.items():
-        kind = file.type_of(channel)
-        if channel.message_encoding != CDR:
-            passed_over.add(key)
-        else:
-            schema = schema_of(key, kind) if kind in jazzy().types else file.schemas.get(channel.schema_id)
-            own[key].stamped = schema is not None and has_header(schema)
-    seen: Counter[int] = Counter()
-    with as_bag_error(file.path):
-        for key, log_time, data in file.messages():
-            seen[key] += 1
-            if bounds[0] <= log_time < bounds[1] and key not in passed_over:
-                own[key].add(log_time, data)
-    for key in passed_over:
-        own[key].count += seen[key]
-    file.check_counts(file.counts, seen)
+    tallies = {topic.name: Tally(topic.name, topic.type) for topic in session.topics}
+    read = list[tuple[SessionFile, set[int]]]()
+    for file in session.files:
+        read.append((file, {key for key, channel in file.channels.items() if channel.message_encoding == CDR}))
+        for key in file.channels.keys() - read[-1][1]:
+            tallies[file.channels[key].topic].count += file.counts.get(key, 0)
+    blocks = SessionBlocks(read, {name: name for name in tallies}, window)
+    are_stamped = [
+        (schema := schema_of(0, each.type) if each.type in jazzy().types else each.schema) is not None and has_header(schema)
+        for each in blocks.sources
+    ]
+    for block in blocks:
+        for source in sorted(set(block.sources.tolist())):
+            own = block.chosen(np.flatnonzero(block.sources == source))
+            tallies[blocks.sources[source].topic].add(own, are_stamped[source])
+    return BagInfo(session, tuple(tallies.values()), window)

@@ -21,8 +21,9 @@ from mcap.summary import Summary
 from numpy.typing import NDArray
 
 from ..errors import BagError
-from ..messages.cdr_decoder import Integers, MessageBlock, by_log_time, gather
+from ..messages.cdr_decoder import MessageBlock, by_log_time, gather
 from ..system.files import open_received
+from ..types import Integers
 from .mcap_records import (
     HEADS,
     LARGEST_SUMMARY,
@@ -37,7 +38,6 @@ from .mcap_records import (
 )
 from .scanner import DamagedBytes, FileDefinitions, scan_records
 from .session_file import (
-    IN_ORDER,
     MOST_HELD,
     PARSE_ERRORS,
     PIECE,
@@ -69,14 +69,6 @@ class McapFile(SessionFile):
     """Content of one .mcap file."""
 
     pieces: list[Piece] = field(default_factory=list)  # in the order of the file
-
-    def messages(self, clock: LogClock = IN_ORDER) -> Iterator[tuple[int, int, bytes]]:
-        """Yield messages as in `SessionFile`, in the order of the file, with one piece in memory."""
-        with open_received(self.path) as file:
-            for piece in self.pieces:
-                block = _messages(_content(file, piece))
-                for row, (channel, time) in enumerate(zip(block.sources.tolist(), block.log_times.tolist(), strict=True)):
-                    yield channel, time, block.data(row)
 
     @cached_property
     def log_clock(self) -> LogClock:

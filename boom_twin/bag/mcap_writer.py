@@ -19,7 +19,7 @@ from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdCompressor
 
 from ..messages.cdr_encoder import Bytes, EncodedBlock
-from ..twin.blocks import Integers
+from ..types import Integers
 from .mcap_records import HEADS, MESSAGE_HEAD, PREFIX
 
 COMPRESSION, LEVEL = "zstd", 1  # the level that zstd uses unless told otherwise, 3, takes twice as long for 1 % fewer bytes

@@ -23,7 +23,7 @@ from rosbags.typesys import TypesysError, get_types_from_msg
 from ..errors import BagError
 from ..messages.type_store import jazzy, other_than_jazzy
 from ..system.files import holds_file, open_received
-from .session_file import CDR, IN_ORDER, MOST_HELD, PARSE_ERRORS, PIECE, LogClock, SessionFile, channel_of, schema_of
+from .session_file import CDR, MOST_HELD, PARSE_ERRORS, PIECE, LogClock, SessionFile, channel_of, schema_of
 
 MAGIC = b"SQLite format 3\0"
 BESIDE = ("-wal", "-journal")  # suffixes of the files in which sqlite3 keeps data that are not in the database yet
@@ -45,7 +45,7 @@ class SqliteFile(SessionFile):
             pieces = (np.array(piece).T for piece in iter(lambda: rows.fetchmany(_TOGETHER), []))
             return LogClock.of(((channels, times.astype(np.uint64)) for channels, times in pieces), self.counts)
 
-    def messages(self, clock: LogClock = IN_ORDER) -> Iterator[tuple[int, int, bytes]]:
+    def messages(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
         """Yield messages as in `SessionFile`, in the order of their log times; as they were stored, if the clock was set back.
 
         Raise BagError if the messages have more bytes than the file: columns with a default, or generated, can give any
@@ -139,7 +139,7 @@ _MEND = "The file is damaged or was cut off: `rosbag reindex` or `rosbag fix` of
 class Ros1File(SessionFile):
     """Content of one .bag file, which has no checksums."""
 
-    def messages(self, clock: LogClock = IN_ORDER) -> Iterator[tuple[int, int, bytes]]:
+    def messages(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
         convert = jazzy().ros1_to_cdr
         with _reader(self.path) as reader:
             for connection, time, data in reader.messages():
@@ -150,12 +150,12 @@ class Ros1File(SessionFile):
 def summarise_ros1(path: Path) -> Ros1File:
     """Return the content of one file, which must have an index; see `boom_twin.bag.reader.summarise`."""
     with _reader(path) as reader:
-        connections = reader.connections
+        connections, names = reader.connections, dict[Any, str]((unpack, name) for name, unpack in _BOUNDED.items())
         return Ros1File(
             path=path,
             storage="ros1",
             library="ROS 1",
-            compression=_compression(reader),
+            compression=next((names.get(chunk.decompressor, "none") for chunk in reader.chunks.values()), "none"),
             channels={each.id: channel_of(each.id, each.topic, _encoding(each)) for each in connections},
             schemas={each.id: schema_of(each.id, each.msgtype) for each in connections},
             counts={each.id: each.msgcount for each in connections},
@@ -172,11 +172,6 @@ def _encoding(connection: Connection) -> str:
         return ENCODING
     is_known = all(name in jazzy().fielddefs for name in found.keys() - set(_OWN))
     return CDR if is_known and not {*other_than_jazzy(found)} - set(_OWN) else ENCODING
-
-
-def _compression(reader: Any) -> str:
-    names = {unpack: name for name, unpack in _BOUNDED.items()}
-    return next((names.get(chunk.decompressor, "none") for chunk in reader.chunks.values()), "none")
 
 
 def _unpack(decompressor: Callable[[], Any], data: bytes) -> bytes:

@@ -260,14 +260,12 @@ def read(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE
 
 def read_both(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE) -> Iterator[tuple[str, int, bytes, Any]]:
     """Return an iterator as `read` does, with the encoded message before the decoded one (None for a type unknown to Jazzy)."""
-    return _one_by_one(read_blocks(session, wanted, window))
-
-
-def _one_by_one(blocks: SessionBlocks) -> Iterator[tuple[str, int, bytes, Any]]:
-    for block in blocks:
-        times = block.log_times.tolist()
-        for row, source in enumerate(block.sources.tolist()):
-            yield blocks.sources[source].name, times[row], block.data(row), blocks.decoded(block, row)
+    blocks = read_blocks(session, wanted, window)
+    return (
+        (blocks.sources[source].name, time, block.data(row), blocks.decoded(block, row))
+        for block in blocks
+        for row, (source, time) in enumerate(zip(block.sources.tolist(), block.log_times.tolist(), strict=True))
+    )
 
 
 def read_blocks(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE) -> SessionBlocks:

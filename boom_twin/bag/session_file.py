@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import struct
-from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
@@ -25,9 +24,9 @@ from rosbags.serde import SerdeError
 from zstandard import ZstdError
 
 from ..errors import BagError, UsageError
-from ..messages.cdr_decoder import CdrDecoder, Integers, MessageBlock, by_log_time, joined
+from ..messages.cdr_decoder import CdrDecoder, MessageBlock, by_log_time, joined
 from ..messages.type_store import decode, jazzy
-from ..types import NANO
+from ..types import NANO, Integers
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +169,7 @@ class Part(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SessionFile(ABC):
+class SessionFile:
     """Content of one file of a session."""
 
     path: Path
@@ -187,10 +186,6 @@ class SessionFile(ABC):
     checked: bool = False  # True if its messages are under a checksum and counted. If not, a flipped bit can pass undetected
     notes: dict[str, str] = field(default_factory=dict)
 
-    def check_counts(self, told: Mapping[int, int], seen: Mapping[int, int]) -> None:
-        """Raise BagError if the statistics and the messages read, by channel, are not the same for every topic."""
-        compare_counts(self.path, "statistics", by_topic(told, self.channels), "read", by_topic(seen, self.channels))
-
     def type_of(self, channel: Channel) -> str:
         """Return the type of a channel as ``package/msg/Name``; "" without a schema.
 
@@ -202,12 +197,12 @@ class SessionFile(ABC):
             parts = [*parts[:-2], parts[-1].removesuffix("_")]
         return "/".join([parts[0], "msg", parts[1]] if len(parts) == 2 else parts)
 
-    @abstractmethod
-    def messages(self, clock: LogClock = IN_ORDER) -> Iterator[tuple[int, int, bytes]]:
-        """Yield channel, log time (ns) and encoded data of all messages.
+    def messages(self, clock: LogClock) -> Iterator[tuple[int, int, bytes]]:
+        """Yield channel, log time (ns) and encoded data of all messages, in the order of log times by the `clock`.
 
-        A storage that has no `parts` of its own yields them in the order of log times by the `clock`.
+        A storage that has `parts` of its own needs none.
         """
+        raise NotImplementedError
 
     @cached_property
     def log_clock(self) -> LogClock:
@@ -242,12 +237,13 @@ def channel_of(number: int, topic: str, encoding: str = CDR) -> Channel:
 
 
 class Source(NamedTuple):
-    """Source of messages: a file, a topic in it, the `name` by which the topic was requested, and its type."""
+    """Source of messages: a file, a topic in it, the `name` by which the topic was requested, its type and definition."""
 
     file: Path
     topic: str
     name: str
     type: str
+    schema: Schema | None
 
 
 class SessionBlocks:
@@ -271,7 +267,8 @@ class SessionBlocks:
         for channel in file.channels.values():
             if channel.id in channels:
                 numbers[channel.id] = len(self.sources)
-                self.sources.append(Source(file.path, channel.topic, asked[channel.topic], file.type_of(channel)))
+                kind, schema = file.type_of(channel), file.schemas.get(channel.schema_id)
+                self.sources.append(Source(file.path, channel.topic, asked[channel.topic], kind, schema))
         return numbers
 
     def __iter__(self) -> Iterator[MessageBlock]:
@@ -326,7 +323,7 @@ def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahea
             times = block.log_times + np.uint64(ahead)
             yield Part(bound + ahead, number, replace(block, sources=sources, log_times=times))
         told = {channel: count for channel, count in file.counts.items() if channel not in passed}
-        file.check_counts(told, seen)
+        compare_counts(file.path, "statistics", by_topic(told, file.channels), "read", by_topic(seen, file.channels))
 
 
 def _in_order(paths: Sequence[Path], files: Sequence[Iterator[Part]]) -> Iterator[MessageBlock]:

@@ -306,6 +306,14 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
     return Mapped(found.topics.in_namespace(namespace), found.source) if namespace.strip("/") else found
 
 
+def mapping_text(session: Path, given: Path | None = None) -> str:
+    """Return the text of a mapping that `mapping_of` has read; empty for the package's own."""
+    if given is not None:
+        return given.read_text(encoding="utf-8-sig")
+    own = kept(session, "mapping", "--mapping")
+    return "" if own is None else own.text
+
+
 @dataclass(frozen=True, slots=True)
 class SessionStrokes:
     """Quantity that drives the model in a session, and the source of this."""

@@ -18,7 +18,7 @@ from ..messages.cdr_encoder import EncodedBlock
 from ..messages.topic_table import Topic
 from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
-from ..twin.blocks import Integers
+from ..types import Integers
 from . import metadata as bagmeta
 from .mcap_records import NOTES, PROFILE
 from .mcap_writer import McapWriter

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -25,7 +25,6 @@ from ..system.processes import python_command
 
 if TYPE_CHECKING:
     from ..bag.session_file import TimeWindow
-    from ..bag.session_model import SessionScene
     from ..config.settings import Settings
     from ..scene.schema import Scene
 
@@ -98,6 +97,7 @@ class SessionTask:
     scene: str | None
     params: str | None
     mapping: str | None
+    namespace: str
     report: bool  # is to be written, with its pictures
     keep_bag: bool  # of the replay
     time: float  # limit, s
@@ -130,9 +130,9 @@ def row_of(task: SessionTask) -> Row:
     from ..system.result_folder import REPLAY, result_folder
 
     session, params = Path(task.session), None if task.params is None else Path(task.params)
-    scene, settings = scene_of(session, task.scene), settings_of(session, params).settings
+    scene, settings = scene_of(session, task.scene), settings_of(session, params, task.namespace).settings
     window = TimeWindow(task.start, task.duration)
-    options = ReplayOptions(mapping=task.mapping, window=window)
+    options = ReplayOptions(mapping=task.mapping, window=window, namespace=task.namespace)
     with result_folder(Path(task.out), REPLAY, [session]) as building:
         found = evaluated_replay(building, session, scene, settings, options, category=task.fatigue)
         if task.report:
@@ -145,7 +145,8 @@ def row_of(task: SessionTask) -> Row:
     row |= {name: value for name, value in summary.items() if name not in ("events", "alarms")}
     row |= {
         "file_sha256": files_sha256(result.session),
-        "rig": _rig(result.session.notes, scene),
+        # by its note, else by description and digest of its scene
+        "rig": result.session.notes.get("rig", "").strip() or f"{found.scene.description} scene {scene.sha256[:12]}".strip(),
         "report": task.report,
         "alarms": [{name: alarm[name] for name in ALARM} for alarm in summary["alarms"]],
         "events": [{"event": name, "count": count} for name, count in summary["events"].items()],
@@ -158,17 +159,12 @@ def row_of(task: SessionTask) -> Row:
     return row | (_calibrated(task, scene.scene, settings, window) if task.calibrate else {})
 
 
-def _rig(notes: Mapping[str, str], scene: SessionScene) -> str:
-    """Return the name of a session's rig: its note ``rig``, else description and digest of its scene."""
-    return notes.get("rig", "").strip() or f"{scene.scene.description} scene {scene.sha256[:12]}".strip()
-
-
 def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: TimeWindow) -> Row:
     """Return the parameters that `boom_twin.calibration.run.calibrate` estimates from one session, or the reason for none."""
     from ..calibration.run import BETWEEN, calibrate
 
     try:
-        found = calibrate([task.session], scene, None, settings, task.mapping, window=window)
+        found = calibrate([task.session], scene, None, settings, task.mapping, window=window, namespace=task.namespace)
     except BoomTwinError as error:
         return {"calibration_reason": str(error).replace("\n", " ")}
     row: Row = {"calibration_misfit": found.misfit, "calibration_remarks": "; ".join(found.remarks)}

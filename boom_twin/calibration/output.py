@@ -7,15 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..bag.session_model import kept
+from ..bag.session_model import mapping_text
 from ..config.yaml_text import with_values
-from ..errors import UsageError
 from ..messages.mapping import load_mapping
 from ..messages.topic_table import factor
 from ..scene.edit import rewritten
 from ..scene.load import with_end_mark
 from ..scene.schema import Scene
-from ..system.files import check_target, write_atomic
+from ..system.files import check_new, write_atomic
 from ..types import Stream
 from .run import Calibration, Estimate
 
@@ -28,9 +27,7 @@ def mapping_path(out: Path) -> Path:
 def refuse_overwriting(out: Path, sources: Sequence[Path], force: bool) -> None:
     """Raise UsageError if a file of the result exists, or would replace one of `sources` or a file of a recording."""
     for path in (out, mapping_path(out)):
-        check_target(path, sources)
-        if path.exists() and not force:
-            raise UsageError(f"{path}: is there already. Name another file, or add --force to replace it.")
+        check_new(path, sources, force)
 
 
 def provenance(found: Calibration, credit: str) -> str:
@@ -59,7 +56,7 @@ def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path
     """
     if not found.zeros:
         return None
-    text, zeros = _mapping_text(bag, mapping), _in_readings(found, joints)
+    text, zeros = mapping_text(bag, mapping), _in_readings(found, joints)
     text = with_values(text, [(("sensors", name, "zero"), zero) for name, zero in zeros.items()])
     head = f"# Zeros of {', '.join(zeros)}: calibrated {credit}.\n"
     path = mapping_path(out)
@@ -71,14 +68,6 @@ def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path
 def _in_readings(found: Calibration, joints: int) -> dict[str, float]:
     sensors = {name: sensor for stream in Stream for name, sensor in found.mapped.topics.sensors_of(stream, joints).items()}
     return {name: sensors[name].zero + shift / factor(name, sensors[name]) for name, shift in found.zeros.items()}
-
-
-def _mapping_text(bag: Path, mapping: Path | None) -> str:
-    """Return the text of the sessions' mapping; empty for the package's own."""
-    if mapping is not None:
-        return mapping.read_text(encoding="utf-8-sig")
-    own = kept(bag, "mapping", "--mapping")
-    return "" if own is None else own.text
 
 
 SHOWN = {"rad": (180.0 / math.pi, "deg"), "m": (1e3, "mm")}

@@ -125,11 +125,8 @@ def calibrate(
     """
     settings, choice = settings or Settings(), choice or Choice()
     progress(0.0, "reading")
-    paths, joints = [Path(bag) for bag in bags], len(scene.joints)
-    mapped = common_mapping(paths, Path(mapping) if mapping else None, joints, namespace)
-    topics = mapped.topics.of_scene(scene.joints)
-    rigging = Rigging(topics.noise_of(settings), tuple(topics.mounts(joints)), common_reading(paths, mapped), topics.places)
-    sessions = read_sessions(paths, topics, joints, window)
+    paths, given = [Path(bag) for bag in bags], Path(mapping) if mapping else None
+    mapped, rigging, sessions = rigged_sessions(paths, scene, settings, given, namespace, window)
     _refuse_other_boom(scene, sessions)
     present = [stream for stream in Stream if any(stream in session.series for session in sessions)]
     names = choice.names or usual_names(scene, present, choice)
@@ -158,7 +155,18 @@ def calibrate(
     return Calibration(better, zeros, estimates, tuple(groups), misfit, fit.passes, tuple(sessions), *judgements)
 
 
-def common_reading(paths: Sequence[Path], mapped: Mapped) -> StrokeReading:
+def rigged_sessions(
+    paths: Sequence[Path], scene: Scene, settings: Settings, mapping: Path | None, namespace: str, window: TimeWindow
+) -> tuple[Mapped, Rigging, list[MeasuredSession]]:
+    """Return the mapping of sessions of one boom, what its sensors are, and the sessions. For arguments see `calibrate`."""
+    joints = len(scene.joints)
+    mapped = _common_mapping(paths, mapping, joints, namespace)
+    topics = mapped.topics.of_scene(scene.joints)
+    rigging = Rigging(topics.noise_of(settings), tuple(topics.mounts(joints)), _common_reading(paths, mapped), topics.places)
+    return mapped, rigging, read_sessions(paths, topics, joints, window)
+
+
+def _common_reading(paths: Sequence[Path], mapped: Mapped) -> StrokeReading:
     """Return what the stroke transducers of all sessions read; UsageError if it differs."""
     found = [strokes_of(path, mapped).reading for path in paths]
     if StrokeReading.ANGLE in found:
@@ -174,7 +182,7 @@ def common_reading(paths: Sequence[Path], mapped: Mapped) -> StrokeReading:
     return found[0]
 
 
-def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int, namespace: str) -> Mapped:
+def _common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int, namespace: str) -> Mapped:
     """Return the mapping of all sessions, or the one at `mapping`; UsageError if the sessions' mappings differ."""
     found = [mapping_of(path, mapping, joints, namespace) for path in paths]
     for path, each in zip(paths, found, strict=True):

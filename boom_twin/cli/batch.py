@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import UsageError
 from ..offline.progress import ProgressLine
-from .arguments import add_session, at_least, positive, window_of
+from .arguments import SESSION_NAMESPACE, add_namespace, add_session, at_least, positive, window_of
 from .output import tell
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--workers", metavar="N", type=at_least(1), help="sessions at a time (default: one per core)")
     scene = "scene file (YAML) for all sessions; without it, the one that each was made with, else the default scene"
     add_session(parser, scene=scene)
+    add_namespace(parser, f"{SESSION_NAMESPACE} and --params")
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
     parser.add_argument("--calibrate", action="store_true", help="estimate the scene's parameters from every session as well")
     fatigue = "damage of all stations, summed up by rig: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
@@ -89,7 +90,7 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
     paths = {name: None if path is None else str(Path(path).resolve()) for name, path in given.items()}
     contents = [f"{name} {sha256_of(Path(path))}" for name, path in paths.items() if path is not None]
     window = window_of(args)
-    kinds = [str(args.report), str(args.keep_bags), str(args.calibrate), str(args.fatigue)]
+    kinds = [str(args.report), str(args.keep_bags), str(args.calibrate), str(args.fatigue), args.namespace]
     options = "\n".join([__version__, *kinds, str(window), *contents])
     return [
         SessionTask(
@@ -98,6 +99,7 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
             out=str(folder.replay(key)),
             fingerprint=fingerprint(session, options),
             **paths,
+            namespace=args.namespace,
             start=window.start,
             duration=window.duration,
             calibrate=args.calibrate,

@@ -16,6 +16,7 @@ from ..scene.schema import Base, Clearance
 from ..scene.segmentation import LEAST_PARTS
 from ..scene.summary import STATIONS, UNKNOWNS_BASE, UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..system.files import check_target
+from ..system.terminal_text import several
 from ..types import Place, Stream, StrokeReading
 from . import reduce as need
 from .arguments import SENSOR_LIST, add_file, add_json, add_scene, files_of, sensors_of
@@ -116,10 +117,9 @@ def summary(name: str, account: Account, warnings: Sequence[Fault], notes: Seque
 
 def report(name: str, scene: Scene, account: Account, warnings: Sequence[Fault], notes: Sequence[Fault]) -> list[str]:
     kinds = " + ".join(joint.kind for joint in scene.joints)
-    count = len(account.sections)
     lines = [f"{name}: this scene can be used"]
     lines += [f"  {scene.description}"] if scene.description else []
-    lines += [f"  {count} section{'s' * (count > 1)}, {kinds}, {scene.reach:.2f} m, {account.mass:.1f} kg"]
+    lines += [f"  {several(len(account.sections), 'section')}, {kinds}, {scene.reach:.2f} m, {account.mass:.1f} kg"]
     lines += _base(scene.base)
     lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_masses(account)]
     sections = [[f"section {section.number}", _section_words(section)] for section in account.sections]

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..system.terminal_text import printable
+from ..system.terminal_text import printable, several
 from ..types import NANO, StrokeReading
 from .arguments import SESSION, SESSION_NAMESPACE, add_json, add_namespace, add_session, window_of
 from .output import columns, open_session_scene, print_result
@@ -48,13 +48,13 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: Session
     return {
         "path": str(session.path),
         "storage": session.files[0].storage,
-        "compression": info.compression,
+        "compression": session.files[0].compression,
         "profile": "ros2" if session.files[0].storage == "mcap" else None,
         "distro": (metadata.ros_distro or None) if metadata else None,
         "metadata_version": metadata.version if metadata else None,
-        "library": info.library,
+        "library": session.files[0].library,
         "files": [file.path.name for file in session.files],
-        "bytes": info.size,
+        "bytes": sum(file.path.stat().st_size for file in session.files),
         "start_ns": start,
         "duration_s": (end - start) * NANO,
         "session_duration_s": (session.end - session.start) * NANO,
@@ -93,8 +93,8 @@ def _gap_begin_s(tally: Tally, start: int) -> float | None:
 def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[str]:
     """Return the lines of text for `values` of `as_json`. Line breaks in names and notes are escaped."""
     made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[values["synthetic"]]
-    files = _several(len(values["files"]), "file")
-    sections = _several(len(scene.scene.sections), "section")
+    files = several(len(values["files"]), "file")
+    sections = several(len(scene.scene.sections), "section")
     distro = values["distro"] or "distribution not noted"
     version = f"metadata version {values['metadata_version']}" if values["metadata_version"] else "no metadata.yaml"
     profile = f"; profile {values['profile']}" if values["profile"] else ""
@@ -133,10 +133,6 @@ def _table(info: BagInfo) -> list[str]:
         own = [tally.name, tally.type, str(tally.count), _number(tally.rate, 2), _number(gap[0], 2), _number(gap[1], 3)]
         rows.append([*own, str(tally.not_increasing), str(tally.unset), *(_number(value, 3) for value in skew)])
     return columns(rows, left=(0, 1))
-
-
-def _several(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _number(value: float | None, digits: int) -> str:

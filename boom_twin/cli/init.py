@@ -11,7 +11,7 @@ from pathlib import Path
 from ..errors import UsageError
 from ..scene.boom_table import read_table
 from ..scene.first_scene import first_scene
-from ..system.files import check_target, write_atomic
+from ..system.files import check_new, write_atomic
 from .output import tell_oddities
 
 
@@ -29,9 +29,7 @@ def run(args: Namespace) -> int:
         return 0
     if args.table is None:
         raise UsageError("--table is not given. Name a table of dimensions; --example-table prints one to start from.")
-    check_target(args.out, [args.table])
-    if not args.force and args.out.is_file() and args.out.stat().st_size:
-        raise UsageError(f"{args.out}: is there already. Name another file, or give --force to replace it.")
+    check_new(args.out, [args.table], args.force)
     table, document = read_table(args.table)
     source = str(args.table)
     text, scene, oddities = first_scene(table, document, source)

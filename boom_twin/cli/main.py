@@ -22,7 +22,7 @@ from typing import NoReturn, TextIO, cast
 
 from .. import __version__
 from ..errors import BoomTwinError
-from ..system.processes import use_one_blas_thread
+from ..system.processes import collect_rarely, use_one_blas_thread
 from ..system.terminal_text import PrintableStream, open_closed_streams
 from .output import quiet
 
@@ -135,17 +135,14 @@ class CommandParser(ArgumentParser):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return the exit code. `argv` is None in the console script, whose process then ends."""
-    # New objects between two garbage collections. Collecting among numba's modules, which hold no garbage, takes 0.05 s, and
-    # 0.09 s at the exit, which gc.freeze() avoids.
-    collect_after = 300_000
     if argv is not None:
         return _main(argv)
     open_closed_streams()
-    gc.set_threshold(collect_after)
+    collect_rarely()
     try:
         return _main(sys.argv[1:])
     finally:
-        gc.freeze()
+        gc.freeze()  # without, the collection at the exit takes 0.09 s
 
 
 def _main(arguments: Sequence[str]) -> int:

@@ -27,8 +27,7 @@ def run(args: Namespace) -> int:
 
     import numpy as np
 
-    from ..calibration.run import common_mapping, common_reading
-    from ..calibration.sessions import Rigging, read_sessions
+    from ..calibration.run import rigged_sessions
     from ..plots.results import stabilisation_picture
     from ..report.operational_modes import measured_rests
     from ..system.files import write_atomic
@@ -36,12 +35,9 @@ def run(args: Namespace) -> int:
 
     bag, out = Path(args.bag), Path(args.out)
     scene, settings = open_session_scene(bag, args.scene).scene, open_session_settings(bag, args.params, args.namespace)
-    joints = len(scene.joints)
-    mapped = common_mapping([bag], args.mapping, joints, args.namespace)
-    rigging = Rigging(settings, tuple(mapped.topics.mounts(joints)), common_reading([bag], mapped))
     with result_folder(out, MODAL, files_of(args, "bag", "scene", "params", "mapping")) as building:
         tell("reading the session ..")
-        (session,) = read_sessions([bag], mapped.topics, joints, window_of(args))
+        _, rigging, (session,) = rigged_sessions([bag], scene, settings, args.mapping, args.namespace, window_of(args))
         tell("identifying modes ..")
         rests = measured_rests(session, scene, rigging)
         files = ["modes.json"]

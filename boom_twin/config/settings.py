@@ -125,12 +125,8 @@ class Thresholds(_Table):
     release: float = setting(0.8, "1", SHARE, "share of a limit below which its level is left", True)
     stale_after: float = setting(2.0, "s", POSITIVE, "time without readings after which a sensor is stale", True)
     gap_warn: float = setting(0.1, "s", POSITIVE, "step between two stamps of a sensor: warning", True)
-    unusable_warn: float = setting(0.01, "1", SHARE, "share of readings missing or out of range: warning", True)
-    unusable_error: float = setting(0.5, "1", SHARE, "share of readings missing or out of range: error", True)
-    frozen_after: float = setting(1.0, "s", POSITIVE, "least time of an unchanged reading before its sensor is frozen", True)
-    frozen_false_alarm: float = setting(
-        1e-9, "1", PROBABILITY, "probability that a live sensor is called frozen, per reading", True
-    )
+    unusable_warn: float = setting(0.01, "1", SHARE, "share of messages without a value: warning", True)
+    unusable_error: float = setting(0.5, "1", SHARE, "share of messages without a value: error", True)
     clock_offset: float = setting(0.05, "s", POSITIVE, "difference between the clocks of two streams: warning", True)
     stamp_offset: float = setting(1.0, "s", POSITIVE, "difference of stamps and node's clock that is reported once", True)
     residual_window: float = setting(10.0, "s", POSITIVE, "time over which a residual is judged", True)

@@ -263,6 +263,11 @@ class HealthWatch:
         alarms = (alarm for alarm in self._alarms.lasting if alarm.channel == channel)
         return next(((_level_of(alarm), alarm.told) for alarm in alarms), None)
 
+    def of_sensor(self, channel: str) -> tuple[Level, str] | None:
+        """Return level and words of the active alarm that blames the sensor of a channel; None without one."""
+        alarms = (alarm for alarm in self._alarms.lasting if alarm.channel == channel and alarm.cause == f"{channel}.sensor")
+        return next(((_level_of(alarm), alarm.told) for alarm in alarms), None)
+
     @property
     def is_alarmed(self) -> bool:
         return bool(self._alarms.lasting)

@@ -1,22 +1,17 @@
-"""Statistics and status of the sensors of a stream: measuring, stuck or silent."""
+"""Statistics and status of the sensors of a stream: readings that arrive, and alarms of `boom_twin.health`."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import inf, isnan, nan
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from math import isnan, nan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..config.settings import Settings
-from ..health.sensor_check import sensor_ranges
-from ..health.sensor_findings import readings_of_frozen
-from ..scene.schema import Scene
-from ..texts import alarm_text
-from ..types import NANO, SENSORS, Array, Mount, Sample, Stream
-from .levels import Bounds, ComponentJudge, Status
+from ..types import NANO, SENSORS, Array, Sample, Stream
+from .levels import Bounds, ComponentJudge, Level, Status
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,17 +24,13 @@ class ChannelStats:
     gap: float  # longest step between their stamps, s
     gaps: int  # steps longer than permitted, since listening began
     missing: float  # share of the messages without a finite value; NaN without messages
-    outside: float  # share of the messages with a value out of range; NaN without messages
-    unchanged: int  # consecutive readings, up to the newest, that repeat the one before
-    step: float  # smallest change between readings of any sensor of the stream since listening began
 
 
 class Channel:
-    """Computation of the statistics of one sensor; `low` and `high` are its range, in its unit."""
+    """Computation of the statistics of one sensor."""
 
-    def __init__(self, low: float = -inf, high: float = inf) -> None:
-        self._low, self._high = low, high
-        self._value, self._stamp, self._unchanged, self._gaps, self._step = nan, 0, 0, 0, inf
+    def __init__(self) -> None:
+        self._value, self._stamp, self._gaps = nan, 0, 0
 
     def look(self, stamps: NDArray[np.int64], values: Array, refused: int, longest: float) -> ChannelStats:
         """Return the statistics of `values` (k,) with `stamps` (k,) in ns; NaN where the message had no value.
@@ -52,12 +43,7 @@ class Channel:
         if len(values):
             steps = np.diff(stamps, prepend=self._stamp or stamps[0]) * NANO
             steps = steps[(steps > 0.0) & (steps <= longest_pause)]
-            change = np.abs(np.diff(values, prepend=self._value))
-            self._step = min(self._step, change[change > 0.0].min(initial=inf))
-            changes = np.flatnonzero(change != 0.0)  # also the first reading ever
-            self._unchanged = len(values) - 1 - int(changes[-1]) if len(changes) else self._unchanged + len(values)
             self._value, self._stamp = float(values[-1]), int(stamps[-1])
-        outside = np.count_nonzero((values < self._low) | (values > self._high))
         total = float(steps.sum())
         self._gaps += int(np.count_nonzero(steps > longest))
         return ChannelStats(
@@ -67,9 +53,6 @@ class Channel:
             gap=float(steps.max(initial=0.0)),
             gaps=self._gaps,
             missing=1.0 - len(values) / messages if messages else nan,
-            outside=outside / messages if messages else nan,
-            unchanged=self._unchanged,
-            step=self._step,
         )
 
 
@@ -80,8 +63,8 @@ class StreamWatch:
     clock offset. The difference of two streams' lags is the offset between their clocks.
     """
 
-    def __init__(self, ranges: Array, monotonic: Callable[[], float] = time.monotonic) -> None:
-        self._ranges, self._monotonic = ranges.tolist(), monotonic
+    def __init__(self, sensors: int, monotonic: Callable[[], float] = time.monotonic) -> None:
+        self._sensors, self._monotonic = sensors, monotonic
         self.count = 0  # messages, since the beginning
         self.begin()
 
@@ -90,7 +73,7 @@ class StreamWatch:
         self.newest: int | None = None
         self._heard, self._looked_count, self._least, self.lag = self._monotonic(), self.count, nan, nan
         self._counted = nan, 0
-        self._channels = [Channel(*bounds) for bounds in self._ranges]
+        self._channels = [Channel() for _ in range(self._sensors)]
         self._samples: list[tuple[int, Array]] = []  # stamps (ns) and values since the last look
 
     def seen(self, stamp: int) -> None:
@@ -126,14 +109,12 @@ class StreamWatch:
     def look(self, longest: float) -> list[ChannelStats]:
         """Return the statistics of every channel since the last look; `longest` (s) is the largest permitted step of stamps."""
         stamps = np.array([stamp for stamp, _ in self._samples], np.int64)
-        table = np.array([values for _, values in self._samples], float).reshape(len(stamps), len(self._ranges))
+        table = np.array([values for _, values in self._samples], float).reshape(len(stamps), self._sensors)
         self._samples = []
         refused = max(0, self.count - self._looked_count - len(stamps))
         self._looked_count = self.count
         self.lag, self._least = self._least, nan
-        found = [channel.look(stamps, table[:, i], refused, longest) for i, channel in enumerate(self._channels)]
-        finest = min((each.step for each in found), default=inf)
-        return [replace(each, step=finest) for each in found]
+        return [channel.look(stamps, table[:, i], refused, longest) for i, channel in enumerate(self._channels)]
 
 
 SLOW = 2.0  # largest step of stamps that is no gap at any rate, in sampling periods
@@ -141,53 +122,32 @@ SLOW = 2.0  # largest step of stamps that is no gap at any rate, in sampling per
 
 @dataclass(frozen=True, slots=True)
 class SensorSpec:
-    """Specification of a sensor: channel, unit as suffix of a key (``m_s2``), range, noise, resolution."""
+    """Specification of a sensor: channel, and unit as suffix of a key (``m_s2``)."""
 
     name: str
     unit: str
-    low: float
-    high: float
-    sigma: float
-    resolution: float
     required: bool = True
 
 
-def sensors_of(
-    scene: Scene,
-    settings: Settings,
-    required: Mapping[Stream, bool],
-    mounts: Sequence[Mount | None],
-    absent: Collection[str] = (),
-) -> dict[Stream, list[SensorSpec]]:
+def sensors_of(joints: int, required: Mapping[Stream, bool], absent: Collection[str] = ()) -> dict[Stream, list[SensorSpec]]:
     """Return the sensors of every stream, in the order of a sample's values.
 
-    Ranges are those of `boom_twin.health.sensor_check.sensor_ranges`. `required` has the inputs that the twin reads, True if
-    it needs them. `absent` are channels without a sensor.
+    `required` has the inputs that the twin reads, True if it needs them. `absent` are channels without a sensor.
     """
-    range_margin = 5.0  # tolerance of a sensor's range, in standard deviations of its noise
     found = {}
-    ranges = sensor_ranges(scene, mounts)
     for stream, kind in SENSORS.items():
         is_required = required.get(Stream(kind.beside or stream))
-        if is_required is None or kind.gives:
-            continue
-        sigma, resolution = settings.noise(kind)
-        unit, over = kind.unit_suffix, range_margin * sigma
-        bounds = zip(kind.channels(len(scene.joints)), *(bound.tolist() for bound in ranges[stream]), strict=True)
-        found[stream] = [
-            SensorSpec(
-                name, unit, low - over, high + over, sigma, resolution, is_required and not kind.beside and name not in absent
-            )
-            for name, low, high in bounds
-        ]
+        if is_required is not None and not kind.gives:
+            needed = is_required and not kind.beside
+            channels = kind.channels(joints)
+            found[stream] = [SensorSpec(name, kind.unit_suffix, needed and name not in absent) for name in channels]
     return found
 
 
-def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats, age: float) -> Status:
-    """Return the status of a sensor by its statistics and the `age` (s) of its last reading.
-
-    Faults have the texts of alarms of `boom_twin.health`.
-    """
+def sensor_status(
+    judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats, age: float, alarm: tuple[Level, str] | None
+) -> Status:
+    """Return the status of a sensor by its statistics, the `age` (s) of its last reading, and its active `alarm`, if any."""
     thresholds, unit = judge.at.thresholds, sensor.unit
     if not stats.stamp and not sensor.required and isnan(stats.missing):  # no message, not even one that is left out
         return judge.finish("absent; optional")
@@ -199,10 +159,6 @@ def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats
     judge.note({"gaps": stats.gaps})
     share = Bounds(thresholds.unusable_warn, thresholds.unusable_error)
     judge.check("missing_share", stats.missing, share, "messages without a value")
-    if sensor.high < inf:
-        judge.note({f"low_{unit}": sensor.low, f"high_{unit}": sensor.high})
-        judge.check("outside_share", stats.outside, share, alarm_text(sensor.name, "range", None))
-    needed = readings_of_frozen(sensor.sigma, max(sensor.resolution, stats.step), thresholds.frozen_false_alarm)
-    stuck, unchanged = Bounds(error=max(thresholds.frozen_after, needed * period)), stats.unchanged * period
-    judge.check("unchanged_s", unchanged, stuck, alarm_text(sensor.name, "stuck", None))
+    if alarm is not None:
+        judge.fault(*alarm)
     return judge.finish("measuring" if stats.stamp else "waiting for a reading")

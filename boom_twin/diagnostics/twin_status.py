@@ -32,8 +32,7 @@ class TwinWatch:
         self._monotonic, self.thresholds = monotonic, thresholds
         self._sensors, self._names, self._reception = sensors, names, ReceptionWatch()
         self._drive = next(iter(sensors), Stream.STROKES)
-        ranges = {stream: np.array([(sensor.low, sensor.high) for sensor in each]) for stream, each in sensors.items()}
-        self._streams = {stream: StreamWatch(each, monotonic) for stream, each in ranges.items()}
+        self._streams = {stream: StreamWatch(len(each), monotonic) for stream, each in sensors.items()}
         self.begin()
 
     def begin(self) -> None:
@@ -128,7 +127,8 @@ class TwinWatch:
         sensors, longest = list[Status](), self.thresholds.gap_warn
         for stream, watch in self._streams.items():
             for sensor, stats in zip(self._sensors[stream], watch.look(longest), strict=True):
-                sensors.append(sensor_status(judge(f"sensor {sensor.name}"), sensor, stats, watch.age_of(stats, at.now)))
+                alarm = None if self.health is None else self.health.of_sensor(sensor.name)
+                sensors.append(sensor_status(judge(f"sensor {sensor.name}"), sensor, stats, watch.age_of(stats, at.now), alarm))
         strokes = self._streams[self._drive].lag
         for stream, watch in self._streams.items():
             if stream not in self._names:

@@ -23,8 +23,7 @@ from ..scene.schema import Scene
 from ..types import NANO, SECOND, SENSORS, Alarm, Array, Ranked, Stream, channels_of
 from ..wiring.readings import LONGEST
 from .alarms import change_text
-from .blocks import Block
-from .sensor_check import ENOUGH, WINDOW, StreamReadings
+from .sensor_check import ENOUGH, WINDOW, Block, SensorCheck
 
 KIND = "deviation"  # kind of all its alarms
 SIGMAS = {Stream.ANGLES: 3.0, Stream.FORCES: 10.0}
@@ -51,7 +50,7 @@ class DeviationMonitor:
         """Active alarms."""
         return list(self._last.values())
 
-    def take(self, readings: StreamReadings, masked: NDArray[np.bool_], block: Block) -> list[Alarm]:
+    def take(self, readings: SensorCheck, masked: NDArray[np.bool_], block: Block) -> list[Alarm]:
         """Take a block, without the channels that are `masked`; return the alarms that began or ended."""
         slow, news = readings.slow, list[Alarm]()
         weight = np.maximum(slow.weight, 1e-9)

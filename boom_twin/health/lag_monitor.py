@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from ..types import NANO, SENSORS, Alarm, Array, Stream
 from ..wiring.readings import CLEAR, SPAN, Lag, lag_near
 from .alarms import change_text
-from .blocks import BLOCK, Block
-from .sensor_check import Readings
+from .sensor_check import BLOCK, Block, Readings
 
 LEAST = 0.025  # s, smallest lag of an alarm: a wrong payload or spring shifts vibration by less
 SIGMAS = 10.0  # smallest lag in standard deviations: a window across its onset gives a mixture
@@ -36,7 +35,7 @@ class LagMonitor:
     def begin(self) -> None:
         """Discard all readings, because the boom restarts at rest; alarms last until all lags are surely small."""
         self._number = 0
-        self._means: dict[Stream, deque[tuple[int, Array]]] = {}  # of each block (ns), see `StreamReadings`
+        self._means: dict[Stream, deque[tuple[int, Array]]] = {}  # of each block (ns), see `SensorCheck`
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -58,7 +57,7 @@ class LagMonitor:
             self._means.clear()
         self._number = block.number
         for stream, each in readings.items():
-            if len(each.rows.stamps) and not SENSORS[stream].beside:
+            if each.has_readings and not SENSORS[stream].beside:
                 means = block.start, np.where(failing[stream], np.nan, each.means[:3])
                 self._means.setdefault(stream, deque(maxlen=WINDOWS[0])).append(means)
         return [] if block.number % EVERY else self._judge(block.end)

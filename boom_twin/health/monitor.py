@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -11,13 +12,12 @@ from ..config.settings import Settings
 from ..deviation.named_faults import FaultyBoom
 from ..scene.edit import loaded
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, SENSORS, Alarm, Array, Channel, Health, Mount, Place, Stream, StrokeReading
-from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows
+from ..types import SECOND, SENSORS, Alarm, Array, Channel, Health, Integers, Mount, Place, Stream, StrokeReading
 from .deviations import SIGMAS, DeviationMonitor, TipLoadMonitor
 from .fault_twins import FaultTwins
 from .faults import Fault, explains, hypothesis
 from .lag_monitor import LagMonitor
-from .sensor_check import NOISE_OVER, Readings, SensorCheck, StreamReadings, sensor_ranges
+from .sensor_check import BLOCK, NOISE_OVER, Block, SensorCheck, SensorFindings, sensor_ranges
 from .sensor_monitor import SensorMonitor
 from .wiring_monitor import WiringMonitor
 
@@ -48,8 +48,8 @@ class HealthMonitor:
 
     Attributes
     ----------
-    blocks : BlockBuilder
-        Takes predictions and measured samples.
+    checks : mapping of Stream to SensorCheck
+        These collect the readings, see `collect`.
     fault_twins : FaultTwins or None
         Fault twins; None if no causes are named.
     """
@@ -71,7 +71,7 @@ class HealthMonitor:
         self._told_faults, self._faulty_booms = list[Alarm](), tuple[FaultyBoom, ...]()
         self._channels = {stream: names for stream, names in channels.items() if names}
         self._ranges = sensor_ranges(scene, mounts)
-        self._uncertain = UNCERTAIN * settings.variance(SENSORS[self._drive])
+        self._uncertain = math.sqrt(UNCERTAIN * settings.variance(SENSORS[self._drive]))
         self._sensors = {
             stream: SensorMonitor(names, stream, stream is not self._drive, absent)
             for stream, names in self._channels.items()
@@ -89,10 +89,9 @@ class HealthMonitor:
 
     def begin(self) -> None:
         """Restart with the boom at rest; alarms of sensors last."""
-        settings = self._settings
-        self.blocks = BlockBuilder()
+        settings, self._closed = self._settings, 0  # ns up to which blocks are judged
         fastest = {self._drive: settings.rate(self._reads)}
-        self._checks = {
+        self.checks = {
             stream: SensorCheck(*settings.noise(kind), *self._ranges[stream], fastest.get(stream, 0.0))
             for stream, kind in SENSORS.items()
             if stream in self._sensors
@@ -110,7 +109,7 @@ class HealthMonitor:
         These are the channels of failing sensors and streams. An IMU is left out until its mean is known: its noise does not
         show wrong axes.
         """
-        unknown = {stream for stream in self._imus if self._checks[stream].slow.weight.max() < KNOWN}
+        unknown = {stream for stream in self._imus if self.checks[stream].slow.weight.max() < KNOWN}
         return np.concatenate(
             [self._masked(stream) | self._wiring.doubted(stream) | (stream in unknown) for stream in self._measured]
         )
@@ -137,22 +136,23 @@ class HealthMonitor:
         `loads`: predicted and estimated force at the tip that the model does not know, N, and its variances, (2, 2) each.
         `tip_sigmas` returns the standard deviations of the predicted tip, m, (2,); it is called only for a report.
         """
-        done = self.blocks.close(stamp)
-        news = [alarm for block in done if block.followed for alarm in self._judge(block)]
+        news, closed, drive = list[Alarm](), (stamp // BLOCK - 1) * BLOCK, self.checks[self._drive]
+        if is_done := drive.first_kept < closed:
+            self._closed = closed
+        while drive.first_kept < closed:
+            news += self._judge(Block(int(drive.first_kept) // BLOCK))
         if any(alarm.kind == "late" for alarm in (*self._lags.alarms, *self._named)):  # late readings look like forces
             self._load.begin()
         else:
             news += self._load.take(stamp, *loads)
-        if done and self.fault_twins is not None:
-            news += self.fault_twins.news(done[-1].end)
-        if not done or not (news or done[-1].end - self._told >= PERIOD or self._told > done[-1].end):
+        if is_done and self.fault_twins is not None:
+            news += self.fault_twins.news(closed)
+        if not is_done or not (news or closed - self._told >= PERIOD or self._told > closed):
             return None
-        self._told = done[-1].end
+        self._told = closed
         alarms = [*(alarm for alarm in news if alarm.until is not None), *self._lasting()]
         noise = {
-            NOISE_OVER + SENSORS[stream].noise: self._checks[stream].noise
-            for stream in MEASURED_NOISE
-            if stream in self._checks
+            NOISE_OVER + SENSORS[stream].noise: self.checks[stream].noise for stream in MEASURED_NOISE if stream in self.checks
         }
         return Health(stamp, tuple(alarms), tip_sigmas(), noise)
 
@@ -193,46 +193,43 @@ class HealthMonitor:
             yield from (alarm for alarm in deviations.alarms if not any(explains(each, stream, alarm) for each in self._named))
         yield from (each for each in self._named if all(each.cause != late.cause for late in self._lags.alarms))
 
+    def collect(self, stream: Stream, rows: Integers, stamps: Integers, raw: Array, left: Array, sigmas: Array) -> None:
+        """Keep readings of a stream for the blocks that are still open, see `SensorCheck.collect`."""
+        self.checks[stream].collect(rows, stamps, raw, left, sigmas, self._closed)
+
     def _judge(self, block: Block) -> list[Alarm]:
         """Return the alarms that a block begins or ends."""
-        predictions, news = block.predictions(), list[Alarm]()
-        is_followed = bool(predictions.variances.max() < self._uncertain)
-        span, readings = BLOCK * NANO if is_followed else 0.0, dict[Stream, StreamReadings]()
+        drive, news = self.checks[self._drive], list[Alarm]()
+        is_followed = drive.largest_sigma(block.end) < self._uncertain
         for stream in self._measured:
             if stream is not self._drive:
-                rows = block.readings(stream)
-                readings[stream] = self._checks[stream].summary(rows, self._sensors[stream].masked, span)
-        for stream, each in readings.items():
-            stamps, raw, left, _ = each.rows
-            expected = raw - left if is_followed else np.full(raw.shape, np.nan)
-            news += self._check(stream, block, stamps, raw, expected)
+                findings = self.checks[stream].take(block, self._sensors[stream].masked, is_followed)
+                news += self._told_by(stream, findings, block)
+        is_shaken = any(self.checks[stream].is_bent for stream in self._measured if stream is not self._drive)
+        findings = drive.take(block, self._sensors[self._drive].masked, not is_shaken)
         if is_followed and not self._sensors[self._drive].masked.any():
-            news += self._compare(block, readings, predictions.measured.mean(axis=0))
-        strokes = predictions.measured
-        is_shaken = any(each.is_bent for each in readings.values())
-        expected = np.full(strokes.shape, np.nan) if is_shaken else np.zeros(strokes.shape)
-        return news + self._check(self._drive, block, predictions.stamps, strokes, expected)
+            news += self._compare(block)
+        return news + self._told_by(self._drive, findings, block)
 
-    def _compare(self, block: Block, readings: Readings, strokes: Array) -> list[Alarm]:
-        """Compare readings with the prediction; `strokes` (n,) are means of the measured ones, m."""
-        news = list[Alarm]()
+    def _compare(self, block: Block) -> list[Alarm]:
+        """Compare readings with the prediction."""
+        news, checks = list[Alarm](), {stream: self.checks[stream] for stream in self._measured if stream is not self._drive}
         failing = {stream: sensors.masked for stream, sensors in self._sensors.items()}
         if self._drive is not Stream.ANGLES:
-            news += self._wiring.take(block, strokes, readings, failing)
+            news += self._wiring.take(block, self.checks, failing)
         if self._wiring.has_wrong_strokes:
             return news
-        news += self._lags.take(readings, failing, block)
+        news += self._lags.take(checks, failing, block)
         for stream, deviations in self._deviations.items():
-            news += deviations.take(readings[stream], self._masked(stream), block)
+            news += deviations.take(checks[stream], self._masked(stream), block)
         return news
 
-    def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
-        """Check the sensors of a stream one by one: stamps (k,) in ns, raw and expected readings (k, channels)."""
-        monitor = self._sensors[stream]
-        findings = self._checks[stream].look(np.asarray(stamps * NANO), raw, expected, block.end * NANO)
+    def _told_by(self, stream: Stream, findings: SensorFindings, block: Block) -> list[Alarm]:
+        """Return the alarms of single sensors of a stream that its findings begin or end."""
+        monitor, check = self._sensors[stream], self.checks[stream]
         if not (findings.flags or monitor.alarms):
             return []
-        newest = (raw if stream is self._drive else raw - expected)[-1] if len(raw) else None
+        newest = check.newest[0 if stream is self._drive else 1] if check.has_readings else None
         return monitor.take(findings, block.start, block.end, newest)
 
 
@@ -245,5 +242,5 @@ def warm_up() -> None:
     """Compile the kernels that judge a rig, on made-up readings of two channels."""
     two = np.zeros((2, 2))
     check = SensorCheck(1.0, 0.0, two[0], two[0], 0.0)
-    check.look(np.arange(2.0), two + 100.0, two, 2.0)
-    check.summary(MeasuredRows(np.arange(2), two, two, two), np.zeros(2, dtype=bool), 1.0)
+    check.collect(np.arange(2), np.arange(2), two + 100.0, two, two)
+    check.take(Block(0), np.zeros(2, dtype=bool))

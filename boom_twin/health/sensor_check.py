@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.schema import Scene
-from ..types import GIVE, Array, Mount, Stream, channels_of
-from .blocks import MeasuredRows
-from .sensor_findings import NOISY as IS_NOISY
-from .sensor_findings import OUTSIDE, SILENT, SPIKES, STUCK, find
-from .sensor_survey import BEFORE, LATELY, NOISY, NOISY_WINDOW, SILENT_FOR, CheckWork, SlowMeans, summarise, survey
+from ..types import GIVE, NANO, Array, Integers, Mount, Stream, channels_of
+from .sensor_findings import HAS_FINDING, IS_BENT, collect, examine
+from .sensor_survey import BEFORE, LATELY, ROWS, TAKEN, CheckWork, SlowMeans
 
 Flags = NDArray[np.bool_]
 
-JERK = 3.0  # m/s^3 of a cylinder in haste, which is no noise of its sensor: 0.2 m in 1.6 s
+BLOCK = 100_000_000  # ns; a block waits as long for late samples
 NOISE_OVER = "noise_over_"  # and the name of a setting: how its figures are called
 MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
 WINDOW = 2.0  # s, time constant of the slow means
@@ -43,33 +41,31 @@ def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, 
     return found
 
 
+class Block(NamedTuple):
+    """Block of time by its number."""
+
+    number: int
+
+    @property
+    def start(self) -> int:
+        """Stamp (ns) at which it begins."""
+        return self.number * BLOCK
+
+    @property
+    def end(self) -> int:
+        """Stamp (ns) at which it ends."""
+        return self.start + BLOCK
+
+
 class SensorFindings(NamedTuple):
     """Findings in one block, shape (channels,) each.
 
-    flags : findings by kind of alarm; empty if there are none. jumped : steps of jumps. level : newest readings minus expected
-    readings.
+    flags : findings by kind of alarm; empty if there are none. jumped : steps of jumps. level : newest residuals.
     """
 
     flags: Mapping[str, Flags]
     jumped: Array
     level: Array
-
-
-class StreamReadings(NamedTuple):
-    """A block of k readings.
-
-    means : (4, channels) means of readings with a prediction, of these predictions, of the variance of their difference, and of
-    all readings; NaN without readings. is_bent : True if trusted sensors show a motion that is fast against their rate. Noise
-    gives the same variance by second and by third differences; motion gives much less by third differences.
-    """
-
-    rows: MeasuredRows
-    means: Array
-    slow: SlowMeans
-    is_bent: bool
-
-
-Readings = Mapping[Stream, StreamReadings]
 
 
 class SensorCheck:
@@ -82,20 +78,36 @@ class SensorCheck:
     low, high : ndarray, shape (channels,)
         Range of the sensors.
     fastest : float
-        Largest rate of the quantity, per s. A faster change is a jump of the sensor. 0: the noise alone decides about jumps.
+        See `boom_twin.health.sensor_findings.examine`.
+
+    Attributes
+    ----------
+    means : ndarray, shape (4, channels)
+        Of the newest block: means of readings with a prediction, of these predictions, of the variance of their difference, and
+        of all readings; NaN without readings. Written anew with every block.
+    slow : SlowMeans
+    is_bent : bool
+        True if trusted sensors show a motion in the newest block that is fast against their rate. Noise gives the same variance
+        by second and by third differences; motion gives much less by third differences.
     """
 
     def __init__(self, sigma: float, resolution: float, low: Array, high: Array, fastest: float) -> None:
         self._sigma = math.sqrt(sigma**2 + resolution**2 / 12.0)
-        self._fastest = fastest
+        self._fastest, self.is_bent = fastest, False
         count, margin, stated2 = len(low), 5.0 * self._sigma, self._sigma**2
-        self.slow, unknown = SlowMeans(*np.zeros((5, count))), np.full((4, count), np.nan)
-        self._known = CheckWork(
+        self.slow, self.means = SlowMeans(*np.zeros((5, count))), np.full((4, count), np.nan)
+        self._work = CheckWork(
+            counts=np.array([BEFORE, 0]),
+            stamps=np.zeros(BEFORE, dtype=np.int64),
+            raw=np.full((BEFORE, count), np.nan),
+            left=np.full((BEFORE, count), np.nan),
+            sigmas=np.full((BEFORE, count), np.nan),
+            column=np.zeros(BEFORE),
             stated=stated2,
             sigma=sigma,
             steps=np.full(count, math.inf),
             resolution=resolution,
-            lately=np.array([(math.inf, stated2, stated2)], LATELY),
+            lately=np.array([(math.inf, stated2, stated2, False)], LATELY),
             low=low - margin,
             high=high + margin,
             heard=np.full(count, np.nan),
@@ -104,50 +116,73 @@ class SensorCheck:
             since=np.zeros(count),
             missing=np.zeros(count),
             outside=np.zeros(count),
-            means=unknown.copy(),
+            means=self.means,
             slow=self.slow,
+            flags=np.zeros((5, count), dtype=bool),
+            jumped=np.zeros(count),
         )
-        self._newest = np.zeros(BEFORE), *np.full((2, BEFORE, count), np.nan)  # stamps (s), readings, residuals
         self._calm = SensorFindings({}, np.zeros(count), np.full(count, np.nan))
-        self._nothing = StreamReadings(MeasuredRows(np.empty(0, np.int64), *np.empty((3, 0, count))), unknown, self.slow, False)
 
     @property
     def noise(self) -> float:
         """Present noise of most channels, in multiples of the stated noise."""
-        return math.sqrt(self._known.lately["lasting"][0]) / self._sigma
+        return math.sqrt(self._work.lately["lasting"][0]) / self._sigma
 
-    def summary(self, rows: MeasuredRows | None, masked: NDArray[np.bool_], span: float) -> StreamReadings:
-        """Return the numbers of a block, and take it into the slow means.
+    @property
+    def has_readings(self) -> bool:
+        """Return True if the newest block had readings."""
+        return bool(self._work.counts[TAKEN])
 
-        `rows` has NaN for a missing reading or prediction. Slow means of `masked` channels (channels,) restart. `span` is the
-        length (s) of the block for the slow means; 0 leaves it out.
+    @property
+    def newest(self) -> tuple[Array, Array]:
+        """Newest readings and residuals, shape (channels,) each."""
+        return self._work.raw[BEFORE - 1], self._work.left[BEFORE - 1]
+
+    def collect(self, rows: Integers, stamps: Integers, raw: Array, left: Array, sigmas: Array, since: int = 0) -> None:
+        """Keep the chosen `rows` of a table for the blocks to come, without those before `since` (ns).
+
+        `stamps` (k,) in ns; readings, residuals, and expected standard deviations of these: (k, channels) each, or more behind.
+        NaN for a missing reading or prediction.
         """
-        if rows is None or not len(rows.stamps):
-            return self._nothing
-        columns = map(np.ascontiguousarray, rows)
-        is_bent = summarise(self._known, *columns, masked, min(1.0, span / WINDOW))
-        return StreamReadings(rows, self._known.means.copy(), self.slow, bool(is_bent))
+        needed, size = int(self._work.counts[ROWS]) + len(rows), len(self._work.stamps)
+        if needed > size:
+            old, shape = self._work, (2 * needed, self._work.raw.shape[1])
+            larger = [np.resize(each, shape) for each in (old.raw, old.left, old.sigmas)]
+            self._work = old._replace(
+                stamps=np.resize(old.stamps, shape[0]),
+                raw=larger[0],
+                left=larger[1],
+                sigmas=larger[2],
+                column=np.zeros(shape[0]),
+            )
+        collect(self._work, rows, stamps, raw, left, sigmas, since)
 
-    def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
-        """Return the findings in a block that ends at `now` (s): stamps (k,) in s, readings and expected ones (k, channels).
+    @property
+    def first_kept(self) -> float:
+        """Stamp (ns) of the earliest kept reading; infinite without one."""
+        return int(self._work.stamps[BEFORE]) if self._work.counts[ROWS] > BEFORE else math.inf
 
-        A reading that is missing is NaN.
+    def largest_sigma(self, end: int) -> float:
+        """Return the largest expected standard deviation of the kept readings before `end` (ns); there is at least one."""
+        own = slice(BEFORE, int(self._work.counts[ROWS]))
+        return float(self._work.sigmas[own][self._work.stamps[own] < end].max())
+
+    def take(self, block: Block, masked: Flags, is_predicted: bool = True) -> SensorFindings:
+        """Take the kept readings in a block, and drop earlier ones; return the findings.
+
+        Slow means of `masked` channels (channels,) restart. Without `is_predicted`, residuals and slow means are left out.
         """
-        if not len(stamps):
-            silent = now - self._known.heard > SILENT_FOR
-            return self._calm._replace(flags={"dropout": silent}) if silent.any() else self._calm
-        pairs = zip(self._newest, (stamps, raw, raw - expected), strict=True)
-        times, raw, left = rows = tuple(np.ascontiguousarray(np.concatenate(pair)) for pair in pairs)
-        self._newest = tuple(each[-BEFORE:] for each in rows)
-        known, largest = self._known, survey(self._known, *rows)
-        interval = (times[-1] - times[BEFORE - 1]) / len(stamps)
-        is_motion = self._fastest > 0.0 and JERK * interval**3 > NOISY * self._sigma  # what bends readings so much
-        is_known = bool(now - known.lately["first"][0] > NOISY_WINDOW and not is_motion)  # how noisy the sensors are
-        flags, jumped = np.empty((5, len(known.power)), dtype=bool), np.empty(len(known.power))
-        if not find(self._known, *rows, largest, now, is_known, self._fastest, np.empty_like(times), flags, jumped):
+        share = BLOCK * NANO / WINDOW if is_predicted else 0.0
+        state = examine(self._work, block.start, block.end, masked, share, is_predicted, self._fastest)
+        self.is_bent = bool(state & IS_BENT)
+        if not state & HAS_FINDING:
             return self._calm
+        stuck, noise, spikes, silent, outside = self._work.flags.copy()
+        jumped = self._work.jumped.copy()
         by_kind = {
-            "stuck": flags[STUCK], "noise": flags[IS_NOISY], "spikes": flags[SPIKES], "jump": jumped != 0.0,
-            "dropout": flags[SILENT], "range": flags[OUTSIDE],
+            "stuck": stuck, "noise": noise, "spikes": spikes, "jump": jumped != 0.0, "dropout": silent, "range": outside,
         }  # fmt: skip
-        return SensorFindings(by_kind, jumped, left[-1].copy())
+        return SensorFindings(by_kind, jumped, self.newest[1].copy())
+
+
+Readings = Mapping[Stream, SensorCheck]

@@ -1,4 +1,4 @@
-"""Findings in a block of readings of single sensors, compiled: stuck, noisy, spikes, silence, out of range, jumps."""
+"""Check of a block of readings of single sensors, compiled: stuck, noisy, spikes, silence, out of range, jumps."""
 
 from __future__ import annotations
 
@@ -6,9 +6,31 @@ import math
 from statistics import NormalDist
 
 from ..kernels.jit import inner, kernel
-from .sensor_survey import BEFORE, SILENT_FOR, least_noise2, loud, noise2_at, read_out
+from ..types import NANO
+from .sensor_survey import (
+    BEFORE,
+    IS_NOISY,
+    NOISY,
+    NOISY_WINDOW,
+    OUTSIDE,
+    ROWS,
+    SILENT,
+    SILENT_FOR,
+    SPIKES,
+    STUCK,
+    TAKEN,
+    gap,
+    is_bent,
+    least_noise2,
+    loud,
+    noise2_at,
+    read_out,
+    summarise,
+    survey,
+)
 
-STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
+HAS_FINDING, IS_BENT = 1, 2  # parts of the result of `examine`
+JERK = 3.0  # m/s^3 of a cylinder in haste, which is no noise of its sensor: 0.2 m in 1.6 s
 FALSE_ALARM = 1e-12  # probability, for each reading, of a finding in white noise
 OUTLIER = -math.sqrt(2.0) * NormalDist().inv_cdf(0.5 * FALSE_ALARM)  # difference of two readings, over their noise
 QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
@@ -18,44 +40,114 @@ ENOUGH, MEDIAN2 = 6, 0.4549  # third differences whose median tells noise; that 
 
 
 @kernel
-def find(sensors, times, raw, left, largest, now, is_known, fastest, column, flags, jumped):
-    """Write the findings in the block that `boom_twin.health.sensor_survey.survey` took; return True if there is any.
+def collect(sensors, rows, stamps, raw, left, sigmas, since):
+    """Append the chosen `rows` of a table that are not before `since` (ns). The table may have further columns behind."""
+    count = sensors.counts[ROWS]
+    for k in range(rows.shape[0]):
+        row = rows[k]
+        if stamps[row] >= since:
+            sensors.stamps[count] = stamps[row]
+            for i in range(sensors.raw.shape[1]):
+                sensors.raw[count, i], sensors.left[count, i] = raw[row, i], left[row, i]
+                sensors.sigmas[count, i] = sigmas[row, i]
+            count += 1
+    sensors.counts[ROWS] = count
+
+
+@kernel
+def examine(sensors, start, end, masked, share, is_predicted, fastest):
+    """Take the block from `start` to `end` (ns): update what is known of every sensor, and write the findings.
 
     Parameters
     ----------
-    sensors, times, raw, left
-        See `survey`.
-    largest : float
-        Change of `left` from one reading to the next, see `survey`.
-    now : float
-        End of the block, s.
-    is_known : bool
-        Whether it is known how noisy the sensors are.
+    sensors : CheckWork
+        Readings before `start` are dropped, as those of a block without predictions.
+    start, end : int
+    masked : ndarray of bool, shape (channels,)
+        Channels that are not trusted.
+    share : float
+        Weight of the block in the slow means.
+    is_predicted : bool
+        False if the residuals are of no use.
     fastest : float
-        What the quantity may change by, per s: more is a jump of the sensor. 0 where a jump is judged by the noise alone.
-    column : ndarray
-        Scratch, as long as the block.
-    flags : ndarray of bool, shape (5, channels)
-        Written, see `STUCK`.
-    jumped : ndarray, shape (channels,)
-        Written: how far readings changed from one to the next, for good, while the model did not; 0 where they did not.
+        Largest rate of the quantity, per s. A faster change is a jump of the sensor. 0: the noise alone decides about jumps.
+
+    Returns
+    -------
+    int
+        Sum of `HAS_FINDING` and `IS_BENT`; the latter if trusted sensors show a motion that is fast against their rate.
     """
-    power, count = sensors.power, times.shape[0]
-    live, newest, found = is_any_live(sensors), times[count - 1], False
+    first = last = BEFORE
+    while first < sensors.counts[ROWS] and sensors.stamps[first] < start:
+        first += 1
+    remove(sensors, BEFORE, first - BEFORE)
+    while last < sensors.counts[ROWS] and sensors.stamps[last] < end:
+        last += 1
+    sensors.counts[TAKEN], sensors.means[:], sensors.jumped[:] = last - BEFORE, math.nan, 0.0
+    if last == BEFORE:
+        sensors.flags[:] = False
+        for i in range(sensors.jumped.shape[0]):
+            sensors.flags[SILENT, i] = end * NANO - sensors.heard[i] > SILENT_FOR
+        return HAS_FINDING if is_any(sensors) else 0
+    stamps, raw, left = sensors.stamps[:last], sensors.raw[:last], sensors.left[:last]
+    summarise(sensors, stamps[BEFORE:], raw[BEFORE:], left[BEFORE:], sensors.sigmas[BEFORE:last], masked, share)
+    found = IS_BENT if is_bent(sensors.stated, raw[BEFORE:], masked) else 0
+    if not is_predicted:
+        left[BEFORE:] = math.nan
+    largest = survey(sensors, stamps, raw, left)
+    interval = (stamps[last - 1] - stamps[BEFORE - 1]) * NANO / (last - BEFORE)
+    is_motion = fastest > 0.0 and JERK * interval**3 > NOISY * math.sqrt(sensors.stated)  # which bends readings so much
+    if not is_motion and is_noisy(sensors):
+        sensors.lately[0].is_live = True
+    is_known = end * NANO - sensors.lately[0].first > NOISY_WINDOW and not is_motion  # how noisy the sensors are
+    find(sensors, stamps, raw, left, largest, end * NANO, is_known, fastest)
+    remove(sensors, 0, last - BEFORE)
+    return found + (HAS_FINDING if is_any(sensors) else 0)
+
+
+@inner
+def is_any(sensors):
+    """Return True if there is a finding."""
+    found = False
+    for i in range(sensors.jumped.shape[0]):
+        for kind in range(sensors.flags.shape[0]):
+            found = found or sensors.flags[kind, i] or sensors.jumped[i] != 0.0
+    return found
+
+
+@inner
+def remove(sensors, at, count):
+    """Remove `count` rows from row `at` on."""
+    if count == 0:
+        return
+    for k in range(at, sensors.counts[ROWS] - count):
+        sensors.stamps[k] = sensors.stamps[k + count]
+        for i in range(sensors.raw.shape[1]):
+            sensors.raw[k, i], sensors.left[k, i] = sensors.raw[k + count, i], sensors.left[k + count, i]
+            sensors.sigmas[k, i] = sensors.sigmas[k + count, i]
+    sensors.counts[ROWS] -= count
+
+
+@inner
+def find(sensors, stamps, raw, left, largest, now, is_known, fastest):
+    """Write the findings in the block that `survey` took, which ends at `now` (s).
+
+    `largest` is the change of `left` from one reading to the next, see `survey`. `is_known` tells whether it is known how noisy
+    the sensors are. For `fastest` see `examine`.
+    """
+    power, count, flags, jumped = sensors.power, stamps.shape[0], sensors.flags, sensors.jumped
+    newest = stamps[count - 1] * NANO
     for i in range(power.shape[0]):
-        is_spiky, jumped[i] = False, 0.0
+        is_spiky = False
         if largest > OUTLIER * math.sqrt(sensors.stated):
-            least = OUTLIER * noise_of(sensors, times, left, i, column)
-            is_spiky, jumped[i] = has_spikes(times, left, i, least), jump(times, raw, left, i, least, fastest)
-        flags[STUCK, i] = live and newest - sensors.since[i] >= REPEATS_FOR and sensors.run[i] >= most_repeats(sensors, i)
-        flags[NOISY, i] = is_known and power[i] > loud(sensors, i)
+            least = OUTLIER * noise_of(sensors, stamps, left, i)
+            is_spiky, jumped[i] = has_spikes(stamps, left, i, least), jump(stamps, raw, left, i, least, fastest)
+        is_old = sensors.lately[0].is_live and newest - sensors.since[i] >= REPEATS_FOR
+        flags[STUCK, i] = is_old and sensors.run[i] >= most_repeats(sensors, i)
+        flags[IS_NOISY, i] = is_known and power[i] > loud(sensors, i)
         flags[SPIKES, i] = is_known and is_spiky
         flags[SILENT, i] = now - sensors.heard[i] > SILENT_FOR or sensors.missing[i] > MISSING
         flags[OUTSIDE, i] = sensors.outside[i] > 0.5 * (count - BEFORE)
-        found = found or jumped[i] != 0.0
-        for kind in range(5):
-            found = found or flags[kind, i]
-    return found
 
 
 @inner
@@ -86,27 +178,26 @@ def readings_of_frozen(sigma, resolution, false_alarm):
 
 
 @inner
-def is_any_live(sensors):
-    """Return True if a channel of several is alive with noise."""
-    power, least = sensors.power, QUIET * math.sqrt(sensors.stated)
-    live = False
-    for i in range(power.shape[0] if power.shape[0] > 1 else 0):
-        live = live or power[i] > least * least
-    return live
+def is_noisy(sensors):
+    """Return True if a channel shows noise. A stream that never has gives clean readings, which repeat while the boom rests."""
+    found = False
+    for i in range(sensors.power.shape[0]):
+        found = found or sensors.power[i] > QUIET * QUIET * sensors.stated
+    return found
 
 
 @inner
-def noise_of(sensors, times, left, i, column):
+def noise_of(sensors, stamps, left, i):
     """Return the noise of channel i: as measured over time, by the median of third differences, or as stated.
 
     That median does not wait for the noise to be measured, as a mean over time does, and one spike leaves it as it is. A sensor
     that has twice the stated noise gives no spikes by that.
     """
-    variance, size = least_noise2(sensors, i), 0
+    variance, size, column = least_noise2(sensors, i), 0, sensors.column
     if sensors.power[i] > variance:
         variance = sensors.power[i]
-    for t in range(BEFORE, times.shape[0]):
-        size = sorted_in(column, size, noise2_at(times, left, t, i))
+    for t in range(BEFORE, stamps.shape[0]):
+        size = sorted_in(column, size, noise2_at(stamps, left, t, i))
     if size >= ENOUGH:
         variance = max(variance, column[(size - 1) // 2] / MEDIAN2)
     return math.sqrt(variance)
@@ -126,33 +217,33 @@ def sorted_in(column, size, value):
 
 
 @inner
-def step(times, left, t, i):
+def step(stamps, left, t, i):
     """Return the change of the residual to reading t of channel i from the one before; NaN across a gap."""
-    if times[t] - times[t - 1] > SILENT_FOR:
+    if gap(stamps, t) > SILENT_FOR:
         return math.nan
     return left[t, i] - left[t - 1, i]
 
 
 @inner
-def has_spikes(times, left, i, least):
+def has_spikes(stamps, left, i, least):
     """Return True if a reading of channel i leaves both neighbours the same way by more than `least`, while these agree."""
-    for t in range(1, times.shape[0] - 1):
-        out, back = step(times, left, t, i), -step(times, left, t + 1, i)
+    for t in range(1, stamps.shape[0] - 1):
+        out, back = step(stamps, left, t, i), -step(stamps, left, t + 1, i)
         if out * back > 0.0 and abs(out) > least and abs(back) > least and abs(out - back) < 0.5 * min(abs(out), abs(back)):
             return True
     return False
 
 
 @inner
-def jump(times, raw, left, i, least, fastest):
+def jump(stamps, raw, left, i, least, fastest):
     """Return how far readings of channel i changed at once by more than `least` and more than `fastest` allows, for good.
 
     The readings make most of that step themselves: where they lag all at once, the expected ones do.
     """
     total = 0.0
-    for t in range(2, times.shape[0] - 1):
-        change = step(times, left, t, i)
-        most = max(least, fastest * (times[t] - times[t - 1]))
+    for t in range(2, stamps.shape[0] - 1):
+        change = step(stamps, left, t, i)
+        most = max(least, fastest * gap(stamps, t))
         read = math.copysign(1.0, change) * (raw[t, i] - raw[t - 1, i])
         if not (abs(change) > most and read > max(most, 0.5 * abs(change))):
             continue

@@ -1,4 +1,4 @@
-"""Survey of single sensors in a block of readings, compiled: noise, repetition, missing and out-of-range readings, means."""
+"""Readings of a stream in blocks, and a survey of its sensors, compiled: noise, repetition, missing readings, range, means."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.jit import by_reference, inner, kernel
-from ..types import NANO, Array
-
-Integers = NDArray[np.int64]
+from ..kernels.jit import by_reference, inner
+from ..types import NANO, Array, Integers
 
 NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
 USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
@@ -37,15 +35,20 @@ class SlowMeans(NamedTuple):
     weight: Array
 
 
-LATELY = np.dtype([("first", float), ("noise", float), ("lasting", float)])
-"""Time (s) of the first reading; usual variance of the noise, now and averaged."""
+LATELY = np.dtype([("first", float), ("noise", float), ("lasting", float), ("is_live", bool)])
+"""Time (s) of the first reading; usual variance of the noise, now and averaged; whether a sensor has shown noise."""
 BEFORE = 3  # readings before a block that `survey` and `find` take with it
+ROWS, TAKEN = range(2)  # places of `CheckWork.counts`
+STUCK, IS_NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of `CheckWork.flags`
 
 
 @by_reference
 class CheckWork(NamedTuple):
-    """State of `survey` and `summarise` for one stream.
+    """State of `examine` for one stream: readings that are not judged yet, after the `BEFORE` newest that are, and statistics.
 
+    counts : number of rows of `stamps` to `sigmas`, and of readings in the newest block.
+    stamps, raw, left, sigmas : (rows,) in ns, and (rows, channels) readings, residuals and expected standard deviations of
+    these; NaN where a reading is missing. column : (rows,) scratch.
     stated : variance of noise and rounding. sigma, resolution : standard deviation of the noise, step of the rounding.
     steps : (channels,) smallest change from one reading to the next so far.
     lately : (1,) see `LATELY`.
@@ -53,9 +56,17 @@ class CheckWork(NamedTuple):
     heard : (channels,) time of the newest reading, s; NaN before the first.
     power, run, since : (channels,) variance of the noise, see `noise2_at`; repetitions of the newest reading; first stamp (s).
     missing, outside : (channels,) share of missing readings; number of readings of the newest block out of range.
-    means : (4, channels) of the newest block, see `boom_twin.health.sensor_check.StreamReadings`. slow : SlowMeans.
+    means : (4, channels) of the newest block, see `boom_twin.health.sensor_check.SensorCheck`. slow : SlowMeans.
+    flags, jumped : (5, channels), (channels,) findings in the newest block: see `STUCK`; by how much readings changed from one
+    to the next, for good, while the model did not; 0 where they did not.
     """
 
+    counts: Integers
+    stamps: Integers
+    raw: Array
+    left: Array
+    sigmas: Array
+    column: Array
     stated: float
     sigma: float
     resolution: float
@@ -71,6 +82,14 @@ class CheckWork(NamedTuple):
     outside: Array
     means: Array
     slow: SlowMeans
+    flags: NDArray[np.bool_]
+    jumped: Array
+
+
+@inner
+def gap(stamps, t):
+    """Return the time from reading t - 1 to reading t, s."""
+    return (stamps[t] - stamps[t - 1]) * NANO
 
 
 @inner
@@ -89,13 +108,13 @@ def rough2(values, t, i):
 
 
 @inner
-def noise2_at(times, values, t, i):
+def noise2_at(stamps, values, t, i):
     """Return the variance of white noise in rows t - 3 to t of channel i, on values that follow a parabola.
 
     It is the smaller one by third differences and by Newton's divided differences. Uneven stamps may be true sampling times, or
     arrival times of evenly sampled readings.
     """
-    a, b, c = times[t - 2] - times[t - 3], times[t - 1] - times[t - 2], times[t] - times[t - 1]
+    a, b, c = gap(stamps, t - 2), gap(stamps, t - 1), gap(stamps, t)
     even = rough2(values, t, i)
     if not (a > 0.0 and b > 0.0 and c > 0.0):
         return even
@@ -106,27 +125,17 @@ def noise2_at(times, values, t, i):
     return min(even, divided * divided / (first * first + second * second + third * third + fourth * fourth))
 
 
-@kernel
-def survey(sensors, times, raw, left):
-    """Take a block of readings, and update the statistics of every channel.
+@inner
+def survey(sensors, stamps, raw, left):
+    """Update the statistics of every channel by a block, and return the largest change of `left` within gaps.
 
-    Parameters
-    ----------
-    sensors : CheckWork
-        Updated with the block.
-    times, raw, left : ndarray, shape (3 + k,), (3 + k, channels), (3 + k, channels)
-        Stamps (s), readings, residuals; the newest `BEFORE` before the block are first; k > 0.
-
-    Returns
-    -------
-    float
-        Largest change of `left` between two readings, except across a gap.
+    `stamps`, `raw`, `left` are those of `sensors` up to the end of the block; the newest `BEFORE` before the block are first.
     """
-    lately, begin = sensors.lately[0], times[BEFORE]
-    if not lately.first <= begin:
-        lately.first = begin
-    span = max(times[times.shape[0] - 1] - begin, 1e-3)
-    largest = go_on(sensors, times, raw, left, min(1.0, span / NOISY_WINDOW))
+    lately, begin, last = sensors.lately[0], stamps[BEFORE], stamps.shape[0] - 1
+    if not lately.first <= begin * NANO:
+        lately.first = begin * NANO
+    span = max((stamps[last] - begin) * NANO, 1e-3)
+    largest = go_on(sensors, stamps, raw, left, min(1.0, span / NOISY_WINDOW))
     lately.noise = usual_power(sensors.power, sensors.stated)
     lately.lasting += min(1.0, span / USUAL_WINDOW) * (lately.noise - lately.lasting)
     return largest
@@ -182,20 +191,20 @@ def usual_power(power, stated):
 
 
 @inner
-def go_on(sensors, times, raw, left, share):
+def go_on(sensors, stamps, raw, left, share):
     """Take the readings of a block, with weight `share` in the averages; return the largest change of `left` within gaps."""
     variance, cut = sensors.stated, (MEASURED * NOISY) ** 2 * sensors.stated
     power, run, missing, outside = sensors.power, sensors.run, sensors.missing, sensors.outside
-    count, largest = times.shape[0], 0.0
+    count, largest = stamps.shape[0], 0.0
     for i in range(power.shape[0]):
         total, known, lacking, newest, outside[i] = 0.0, 0, 0, -1, 0.0
         for t in range(1, count):
             step = abs(left[t, i] - left[t - 1, i])
-            if times[t] - times[t - 1] <= SILENT_FOR and step > largest:
+            if gap(stamps, t) <= SILENT_FOR and step > largest:
                 largest = step
             if t < BEFORE:
                 continue
-            noise2 = noise2_at(times, left, t, i)
+            noise2 = noise2_at(stamps, left, t, i)
             if not math.isnan(noise2):
                 total += min(noise2, cut)
                 known += 1
@@ -206,16 +215,16 @@ def go_on(sensors, times, raw, left, share):
             if raw[t, i] == raw[t - 1, i]:
                 run[i] += 1
             elif math.isfinite(raw[t, i]):
-                run[i], sensors.since[i] = 0, times[t]
+                run[i], sensors.since[i] = 0, stamps[t] * NANO
                 if math.isfinite(raw[t - 1, i]):
                     sensors.steps[i] = min(sensors.steps[i], abs(raw[t, i] - raw[t - 1, i]))
             if math.isfinite(raw[t, i]):
                 newest = t
         if newest >= 0:
-            if not times[newest] <= sensors.heard[i]:
-                sensors.heard[i] = times[newest]
+            if not stamps[newest] * NANO <= sensors.heard[i]:
+                sensors.heard[i] = stamps[newest] * NANO
         elif math.isnan(sensors.heard[i]):
-            sensors.heard[i] = times[BEFORE]
+            sensors.heard[i] = stamps[BEFORE] * NANO
         missing[i] += share * (lacking / (count - BEFORE) - missing[i])
         if known > 0:
             heard = total / known
@@ -232,19 +241,11 @@ def is_outside(sensors, reading, i):
     return reading < sensors.low[i] or reading > sensors.high[i]
 
 
-@kernel
+@inner
 def summarise(sensors, stamps, raw, left, sigmas, masked, share):
-    """Compute the numbers of a block of readings and update the slow means; return `is_bent`.
+    """Compute the means of a block of readings, and update the slow means.
 
-    Parameters
-    ----------
-    sensors : CheckWork
-    stamps, raw, left, sigmas : ndarray, shape (k,), (k, channels), (k, channels), (k, channels)
-        See `boom_twin.health.blocks.MeasuredRows`; NaN where a reading is missing; k > 0.
-    masked : ndarray of bool, shape (channels,)
-        Channels that are not trusted. Their slow means restart at 0.
-    share : float
-        Weight of the block in the slow means.
+    Slow means of channels that are `masked` (channels,) restart at 0. `share` is the weight of the block in the others.
     """
     means, slow, last = sensors.means, sensors.slow, stamps.shape[0] - 1
     span = (stamps[last] - stamps[0]) * NANO
@@ -275,7 +276,6 @@ def summarise(sensors, stamps, raw, left, sigmas, masked, share):
             slow.weight[i] += share * (1.0 - slow.weight[i])
         if math.isfinite(rate) and not masked[i]:
             slow.rate[i] += share * (rate - slow.rate[i])
-    return is_bent(sensors.stated, raw, masked)
 
 
 @inner

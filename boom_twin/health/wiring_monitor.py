@@ -20,8 +20,7 @@ from ..wiring.check import Checked, channel_name, check, likely
 from ..wiring.hypotheses import as_read
 from ..wiring.readings import RestModel, Series, Window, is_checked
 from .alarms import UNKNOWN
-from .blocks import Block
-from .sensor_check import Flags, Readings
+from .sensor_check import Block, Flags, Readings
 
 KIND = "wiring"  # kind of all its alarms
 SCENE = "scene"  # channel and cause of the alarm that the scene is of another boom
@@ -118,15 +117,15 @@ class WiringMonitor:
         is_of_reading = alarm.kind in {"range", "jump", "noise", "spikes", "intermittent"}
         return is_of_reading and alarm.channel in self._chosen(self._wrong | self._doubted)
 
-    def take(self, block: Block, strokes: Array, readings: Readings, failing: Mapping[Stream, Flags]) -> list[Alarm]:
-        """Take a block with its mean strokes (n,) in m; return the alarms that began or ended.
+    def take(self, block: Block, readings: Readings, failing: Mapping[Stream, Flags]) -> list[Alarm]:
+        """Take a block; return the alarms that began or ended.
 
         Channels that are `failing` by themselves are left out once their wiring is known to be right.
         """
         if self._age < CHECKS[-1]:
-            means = {Stream.STROKES: strokes}
+            means = {Stream.STROKES: readings[Stream.STROKES].means[3].copy()}
             for stream, own in self._own.items():
-                if stream is not Stream.STROKES and len(readings[stream].rows.stamps):
+                if stream is not Stream.STROKES and readings[stream].has_readings:
                     means[stream] = np.where(failing[stream] & self._right[own], np.nan, readings[stream].means[3])
             self._blocks.append((block.start, means))
             self._silent = {s: failing[s] & np.isnan(means.get(s, np.nan)) for s in self._channels}

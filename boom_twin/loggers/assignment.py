@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ..config.yaml_text import read_plain
 from ..errors import BagError, Fault, UsageError, bound_of, listed
+from ..system.terminal_text import several
 from ..types import SENSORS, Stream, channels_of, sensor_kind, stream_of
 from .csv_layout import TIME_UNITS, guess, unit_of
 from .log_table import LogTable
@@ -156,7 +157,7 @@ class Assignment:
                 f"FILE; the twin needs {needs if drive is Stream.STROKES else 'the angle of every joint, by `drive: angles`'}."
             )
         if problems:
-            raise BagError("\n  ".join([f"{len(problems)} fault{'s' * (len(problems) > 1)} in the columns:", *problems]))
+            raise BagError("\n  ".join([f"{several(len(problems), 'fault')} in the columns:", *problems]))
 
 
 def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) -> Assignment:

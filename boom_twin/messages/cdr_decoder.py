@@ -14,10 +14,8 @@ import numpy as np
 from mcap.records import Schema
 from numpy.typing import NDArray
 
-from ..types import SECOND, SENSORS, Stream
+from ..types import SECOND, SENSORS, Integers, Stream
 from .type_store import PADDING, decode, text_in
-
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

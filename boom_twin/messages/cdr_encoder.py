@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..twin.blocks import Integers
-from ..types import SECOND, Array
+from ..types import SECOND, Array, Integers
 from .type_store import jazzy
 
 Bytes = NDArray[np.uint8]

@@ -16,8 +16,8 @@ import numpy as np
 from ..deviation.estimate_row import FORCE_VARIANCE, MODES
 from ..kernels.tip_joints import write_derived
 from ..predictions import Estimate, Prediction
-from ..twin.blocks import EstimateBlock, Integers, PredictionBlock, row_of
-from ..types import Array
+from ..twin.blocks import EstimateBlock, PredictionBlock, row_of
+from ..types import Array, Integers
 from .cdr_encoder import NumberFields
 from .topic_table import TIP_JOINTS, Output
 from .type_store import fill_xz

@@ -16,8 +16,8 @@ from ..health.alarms import alarm_of, values_of
 from ..predictions import Estimate, Prediction
 from ..scene.kinematics import PassiveJoints
 from ..scene.schema import Scene
-from ..twin.blocks import STREAMS, EstimateBlock, Integers, PredictionBlock, ReportBlock, ResidualBlock
-from ..types import SECOND, Alarm, Array, Change, Health, Report, channels_of, stream_of
+from ..twin.blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock
+from ..types import SECOND, Alarm, Array, Change, Health, Integers, Report, channels_of, stream_of
 from .cdr_encoder import STAMP, Bytes, EncodedBlock, EncodedBlockBuilder, NumberFields, Template
 from .numeric_outputs import ESTIMATED, JOINTS, PREDICTED, Chain, Placer, number_rows, selection
 from .sample_decoder import stamp_of

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..types import LIMIT, SECOND, SENSORS, Array, Sample, Stream
-from .cdr_decoder import Axes, Integers, Vector
+from ..types import LIMIT, SECOND, SENSORS, Array, Integers, Sample, Stream
+from .cdr_decoder import Axes, Vector
 from .sample_assembler import Reading, SampleAssembler
 from .topic_table import Topics, factor, load_topics
 

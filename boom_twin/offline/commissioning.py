@@ -13,10 +13,9 @@ import numpy as np
 
 from ..bag.reader import Session, read_blocks, scan
 from ..bag.session_file import WHOLE, TimeWindow
-from ..bag.session_model import SessionScene, kept, mapping_of, scene_of, settings_of, strokes_of
-from ..config.yaml_text import plain, read_plain
+from ..bag.session_model import SessionScene, mapping_of, mapping_text, scene_of, settings_of, strokes_of
+from ..config.yaml_text import plain
 from ..errors import BagError, UsageError
-from ..messages.cdr_decoder import Integers
 from ..messages.mapping import NO_LAG, mapping_from
 from ..messages.topic_table import Sensor, Topics, usual
 from ..scene.edit import loaded
@@ -24,7 +23,7 @@ from ..scene.load import SceneSource
 from ..scene.schema import Scene
 from ..twin.blocks import CODES, SampleBlock
 from ..twin.twin import Twin
-from ..types import SENSORS, Array, Channel, Place, Stream, StrokeReading
+from ..types import SENSORS, Array, Channel, Integers, Place, Stream, StrokeReading
 from ..wiring.check import ABSENT, STROKES_ALONE, Checked, Verdict, check, finding, likely, reading
 from ..wiring.hypotheses import SLACK, si
 from ..wiring.readings import Lag, RestModel, Series, Window, is_checked, lag_of
@@ -54,14 +53,9 @@ class Commissioning:
         return [verdict for verdict in self.checked.verdicts if verdict.is_wrong]
 
     @property
-    def late(self) -> dict[Stream, Lag]:
-        """Streams whose lag is proposed as a delay."""
-        return {stream: lag for stream, lag in self.lags.items() if is_late(lag)}
-
-    @property
     def has_proposal(self) -> bool:
         """Return True if a mapping is proposed."""
-        return bool(self.late) or bool(self.absent) or any(verdict.is_sure for verdict in self.wrong)
+        return any(map(is_late, self.lags.values())) or bool(self.absent) or any(verdict.is_sure for verdict in self.wrong)
 
 
 def wiring_of(
@@ -115,7 +109,8 @@ def commission(
     session = scan(Path(bag))
     own, given = scene_of(session.path, scene), None if mapping is None else Path(mapping)
     joints = len(own.scene.joints)
-    mapped, document = mapping_of(session.path, given, joints, namespace), _mapping_content(session.path, given)
+    mapped = mapping_of(session.path, given, joints, namespace)
+    document = dict(plain(mapping_text(session.path, given)) or {})
     reads = strokes_of(session.path, mapped).reading
     if reads is StrokeReading.ANGLE:
         raise BagError(f"{session.path}: has `drive: angles`. The check needs the strokes of all cylinders; it cannot be made.")
@@ -171,13 +166,6 @@ def _lost(found: Checked, series: Mapping[str, Series], scene: Scene) -> Iterato
         missing, outside = np.isnan(share).sum(), (np.abs(share - 0.5) > 0.5 + SLACK).sum()
         if missing or outside:
             yield f"{verdict.channel}: {missing} readings missing, {outside} beyond the travel"
-
-
-def _mapping_content(session: Path, mapping: Path | None) -> dict[str, Any]:
-    if mapping is not None:
-        return dict(read_plain(mapping, UsageError, "Give a file like msg_config/topics.yaml.") or {})
-    own = kept(session, "mapping", "--mapping")
-    return {} if own is None else dict(plain(own.text) or {})
 
 
 def _mend(document: dict[str, Any], found: Checked) -> None:

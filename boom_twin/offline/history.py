@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from ..plots.results import SLOW
 from ..plots.session import ENLARGED_SPAN
 from ..scene.kinematics import gravity_in_base
 from ..scene.schema import Scene
-from ..types import NANO, Array, Stream, channels_of
+from ..types import NANO, Array, Stream
 from .ground_truth import TipTruth
 from .recording import Recording, ResidualRows, Stretch
 from .replay import Replay
@@ -66,8 +66,6 @@ PREDICTED = (
 )  # fmt: skip
 """Fields of a `History` with a row for every prediction."""
 ESTIMATED = tuple(f"estimated {each.name}" for each in fields(EstimateTrace))  # columns of the estimates beside them
-RESIDUALS = ("stamps", "values", "sigmas", "means")  # columns of one stream; means over a second
-Residuals = Mapping[Stream, dict[str, Array]]
 EXTREME = ("tip_displacement", "tip_position", "tip_acceleration", "moments", "slow_moments", *ESTIMATED[:3])
 """Columns whose extremes are kept."""
 
@@ -81,36 +79,31 @@ class HistoryBuilder:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._plan = scene, compile_scene(scene)
-        self._tables: dict[str | Stream, dict[str, list[Array]]] = {}
+        self._tables: dict[str, dict[str, list[Array]]] = {}  # of predictions, of each channel's residuals, of the IMU
         self._distributions = SessionDistributionsBuilder()
         self._shapes: list[tuple[float, Array]] = []
         self._peak, self._peak_at = -1.0, 0.0  # largest acceleration of the tip, and when, s
 
     def add(self, stretch: Stretch) -> History:
         """Add the next stretch; return the history of it alone, with all its rows."""
-        residuals = _residual_columns(stretch)
-        own = _stretch_history(stretch, self._scene, self._plan, residuals)
-        self._note_peak(own)
+        own = _stretch_history(stretch, self._scene, self._plan)
+        size = np.hypot(*own.tip_acceleration.T)
+        if np.isfinite(size).any() and float(np.nanmax(size)) > self._peak:
+            self._peak, self._peak_at = float(np.nanmax(size)), float(own.stamps_s[np.nanargmax(size)])
         self._distributions.add(own)
         width = stretch.length / BINS if stretch.length > LONGEST_WHOLE else 0.0
-        estimated = dict(zip(ESTIMATED, _estimate_trace(stretch).columns, strict=True))
+        estimated = dict(zip(ESTIMATED, vars(_estimate_trace(stretch)).values(), strict=True))
         self._put("predicted", {name: getattr(own, name) for name in PREDICTED} | estimated, EXTREME, width)
-        for stream, columns in residuals.items():
-            self._put(stream, columns, ("values", "means"), width)
+        for name, trace in own.residuals.items():
+            self._put(name, vars(trace), ("values", "means"), width)
         if own.imu is not None:
-            columns = {each.name: getattr(own.imu, each.name) for each in fields(ImuTrace)}
-            self._put("imu", columns, ("measured", "predicted"), width)
+            self._put("imu", vars(own.imu), ("measured", "predicted"), width)
         for shape in own.shapes:
             if not self._shapes or abs(shape[0] - self._shapes[-1][0]) >= width:
                 self._shapes.append(shape)
         return own
 
-    def _note_peak(self, own: History) -> None:
-        size = np.hypot(*own.tip_acceleration.T)
-        if np.isfinite(size).any() and float(np.nanmax(size)) > self._peak:
-            self._peak, self._peak_at = float(np.nanmax(size)), float(own.stamps_s[np.nanargmax(size)])
-
-    def _put(self, key: str | Stream, columns: dict[str, Array], names: Sequence[str], width: float) -> None:
+    def _put(self, key: str, columns: dict[str, Array], names: Sequence[str], width: float) -> None:
         """Keep rows: if bins have a `width` (s), those with extremes of the columns `names`, and those about the peak."""
         times = next(iter(columns.values()))
         if width:
@@ -122,13 +115,13 @@ class HistoryBuilder:
 
     def history(self, recording: Recording) -> History:
         """Return the history of all stretches so far; at least one."""
-        tables: dict[Any, dict[str, Any]] = {
+        tables: dict[str, dict[str, Any]] = {
             key: {name: np.concatenate(parts) for name, parts in table.items()} for key, table in self._tables.items()
         }
         found, load = tables["predicted"], recording.totals.load.load
         return History(
             **{name: found[name] for name in PREDICTED},
-            residuals=_residuals(len(self._scene.joints), tables),
+            residuals={name: ResidualTrace(**table) for name, table in tables.items() if name not in ("predicted", "imu")},
             imu=ImuTrace(**tables["imu"]) if "imu" in tables else None,
             shapes=self._shapes,
             gaps=[((start - recording.first) * NANO, (end - recording.first) * NANO) for start, end in recording.gaps],
@@ -139,7 +132,7 @@ class HistoryBuilder:
         )
 
 
-def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan, residuals: Residuals) -> History:
+def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan) -> History:
     """Return everything predicted in a stretch, with all its rows, but without gaps and alarms."""
     predictions = stretch.predictions
     stamps = _seconds(predictions.stamps, stretch.first)
@@ -153,7 +146,7 @@ def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan, residuals: Resi
         joints=predictions.joints,
         cylinder_forces=predictions.cylinder_forces,
         strokes=drives_as_read(plan, predictions.strokes, predictions.cylinder_forces, stretch.reads),
-        residuals=_residuals(stretch.joints, residuals),
+        residuals=_residuals(stretch),
         imu=_imu(stretch.residuals_of(Stream.IMU), stamps, felt, stretch.first),
         shapes=[(float(stamps[row]), outline.shape.copy()) for row, outline in predictions.outlines.items()],
         moments=predictions.moments,
@@ -169,15 +162,6 @@ def _estimate_trace(stretch: Stretch) -> EstimateTrace:
     variances = estimates.tip_covariance[:, xy], estimates.acceleration_covariance[:, xy], estimates.load_variance
     told = estimates.tip[:, :2] - rigid, estimates.acceleration[:, :2], estimates.load
     return EstimateTrace(*(np.where(fed, each, np.nan) for each in (*told, *map(np.sqrt, variances))))
-
-
-def _running_means(stamps: Array, values: Array) -> Array:
-    """Return the means of residuals over a second, shape (k, channels); NaN where not measured."""
-    means = np.full_like(values, np.nan)
-    for column, mean in zip(values.T, means.T, strict=True):
-        known = np.isfinite(column)
-        mean[known] = running_mean(stamps[known], column[known])
-    return means
 
 
 def _alarms(recording: Recording, end: float) -> list[AlarmSpan]:
@@ -198,25 +182,18 @@ def _seconds(stamps: NDArray[np.int64], first: int) -> Array:
     return np.asarray((stamps - first) * NANO, float)
 
 
-def _residual_columns(stretch: Stretch) -> Residuals:
-    """Return the columns `RESIDUALS` of all streams that have any: stamps (k,) in s, else shape (k, channels)."""
+def _residuals(stretch: Stretch) -> dict[str, ResidualTrace]:
+    """Return the residuals of every channel of the streams that have any."""
     found = {}
     for stream in Stream:
-        if len((rows := stretch.residuals_of(stream)).stamps):
-            stamps = _seconds(rows.stamps, stretch.first)
-            columns = stamps, rows.values, rows.sigmas, _running_means(stamps, rows.values)
-            found[stream] = dict(zip(RESIDUALS, columns, strict=True))
+        if not len((rows := stretch.residuals_of(stream)).stamps):
+            continue
+        stamps = _seconds(rows.stamps, stretch.first)
+        for name, values, sigmas in zip(rows.names, rows.values.T, rows.sigmas.T, strict=True):
+            known, means = np.isfinite(values), np.full_like(values, np.nan)
+            means[known] = running_mean(stamps[known], values[known])
+            found[name] = ResidualTrace(stamps, values, sigmas, means)
     return found
-
-
-def _residuals(joints: int, found: Residuals) -> dict[str, ResidualTrace]:
-    """Return the residuals of every channel of the streams found."""
-    return {
-        name: ResidualTrace(found[stream]["stamps"], *(found[stream][column][:, i] for column in RESIDUALS[1:]))
-        for stream, names in channels_of(joints).items()
-        if stream in found
-        for i, name in enumerate(names)
-    }
 
 
 def _imu(force: ResidualRows, stamps: Array, felt: Array, first: int) -> ImuTrace | None:

@@ -12,13 +12,12 @@ from ..bag.session_file import WHOLE, TimeWindow
 from ..bag.session_model import SessionScene, SessionStrokes, mapping_of, scene_of, settings_of, strokes_of
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
-from ..health.wiring_monitor import SCENE
 from ..messages.sample_decoder import NO_MEASUREMENT
 from ..messages.topic_table import NO_AREAS, InputTopic, Topics
 from ..scene.load import SceneSource
 from ..scene.schema import Scene
 from ..twin.twin import Twin
-from ..types import NANO, SENSORS, Health, Stream, streams_of
+from ..types import NANO, SENSORS, Stream, streams_of
 from .progress import Progress
 from .session_samples import topics_read
 
@@ -91,12 +90,6 @@ class ReplayInputs:
         """Return a twin for the session, which names causes of faults if that is asked for."""
         sensing = self.topics.sensing(len(self.scene.joints)) | {"reads": self.strokes.reading}
         return Twin(self.scene, self.topics.noise_of(self.settings), health=self.health, causes=causes, **sensing)
-
-    def refuse_other_boom(self, health: Health) -> None:
-        """Raise BagError if the wiring check says that the session is of another boom than the scene."""
-        for alarm in health.alarms:
-            if alarm.cause == SCENE:
-                raise of_another_boom(self.session, self.kept, alarm.evidence)
 
 
 def of_another_boom(session: Session, scene: SessionScene, angles: str) -> BagError:

@@ -21,6 +21,7 @@ from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
 from ..errors import BagError
 from ..health.sensor_check import sensor_ranges
+from ..health.wiring_monitor import SCENE
 from ..messages.sample_decoder import ODDITIES
 from ..scene.load import SceneSource
 from ..system.files import write_atomic
@@ -31,7 +32,7 @@ from ..twin.blocks import CODES, CONSEQUENCES, EVENTS, SampleBlock
 from ..twin.twin import Twin, drive
 from ..types import SENSORS, Array, StrokeReading
 from .ground_truth import TipErrors, TipTruth, truth_in
-from .inputs import USUAL, ReplayInputs, ReplayOptions, replay_inputs
+from .inputs import USUAL, ReplayInputs, ReplayOptions, of_another_boom, replay_inputs
 from .progress import Progress
 from .recording import Recording, Stretch, alarm_as_text, clocks_of, summary_of
 from .sample_table import SampleTable, columns_of
@@ -220,8 +221,8 @@ def replay_into(
                 continue
             block, rows = step
             recording.add(rows, block)
-            for health in rows.health.values():
-                given.refuse_other_boom(health)
+            for alarm in (alarm for health in rows.health.values() for alarm in health.alarms if alarm.cause == SCENE):
+                raise of_another_boom(session, given.kept, alarm.evidence)
             if put is not None:
                 put(rows)
     if bar is not None:

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..deviation.estimate_row import MODES, VARIANCES
 from ..errors import UsageError
-from ..twin.blocks import CODES, Integers, SampleBlock
-from ..types import NANO, SENSORS, USUAL_STREAMS, Array, Stream, channels_of
+from ..twin.blocks import CODES, SampleBlock
+from ..types import NANO, SENSORS, USUAL_STREAMS, Array, Integers, Stream, channels_of
 from .recording import Stretch
 
 ESTIMATED = (

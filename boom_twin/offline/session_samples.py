@@ -21,8 +21,8 @@ from ..messages.report_encoder import ReportEncoder, decode_changes
 from ..messages.sample_decoder import SampleDecoder
 from ..messages.topic_table import Output, Topic, Topics
 from ..scene.schema import Scene
-from ..twin.blocks import CODES, Integers, ReportBlock, SampleBlock, block_of, samples_in
-from ..types import SENSORS, Array, Change, Sample, Stream
+from ..twin.blocks import CODES, ReportBlock, SampleBlock, block_of, samples_in
+from ..types import SENSORS, Array, Change, Integers, Sample, Stream
 
 
 class Changes:

@@ -81,14 +81,10 @@ def joint_ranges_picture(path: Path, scene: Scene, name: str) -> Path:
     return path
 
 
-def _straight(scene: Scene) -> Array:
-    return np.asarray(np.radians(np.clip(0.0, *np.transpose([joint.range_deg for joint in scene.joints]))))
-
-
 def _joint(axes: Axes, scene: Scene, i: int) -> None:
     """Draw sections before and after, links and cylinder: the ends of the range in full, positions between as a shadow."""
     axes.set_aspect("equal", adjustable="box")
-    straight, pins = _straight(scene), list[Array]()
+    straight, pins = np.radians(np.clip(0.0, *np.transpose([joint.range_deg for joint in scene.joints]))), list[Array]()
     for place, degrees in enumerate(np.linspace(*scene.joints[i].range_deg, POSITIONS)):
         angles = straight.copy()
         angles[: i + 1] = 0.0

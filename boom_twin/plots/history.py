@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,10 +40,6 @@ class EstimateTrace:
     displacement_sigmas: Array  # standard deviations
     acceleration_sigmas: Array
     load_sigmas: Array
-
-    @property
-    def columns(self) -> tuple[Array, ...]:
-        return tuple(getattr(self, each.name) for each in fields(self))
 
 
 @dataclass(frozen=True)

@@ -198,6 +198,8 @@ def spectrum_picture(path: Path, session: str, history: History, note: str) -> N
             axes.set_title(f"{quantity[0].upper()}{quantity[1:]}, {names[i]}")
             axes.set_xlabel("frequency, Hz")
             axes.minorticks_off()
+            for axis in (axes.xaxis, axes.yaxis):
+                axis.set_major_formatter("{x:g}")  # powers of ten need mathtext, which takes 0.2 s
             _modes(axes, history.natural)
             legend_above(axes, 2)
         panels[0].set_ylabel("power spectral density, (m/s²)²/Hz")

@@ -92,6 +92,8 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
             figure.text(0.988, 1.0 - 0.16 / size[1], shorten(printable(note), NOTE, placeholder=" .."), **SMALL)
         yield figure
         _part_titles_and_legends(figure)
+        for spine in (each for axes in figure.axes for each in axes.spines.values()):
+            spine.set_in_layout(False)  # each would make all ticks anew, and none is outside of the tick labels
         content = BytesIO()
         # `savefig` draws everything twice, the first time for its layout
         canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
@@ -104,9 +106,10 @@ def _part_titles_and_legends(figure: Any) -> None:
 
     for axes in figure.axes:
         legend, text = axes.get_legend(), axes.get_title(loc="left")
-        for title in axes.get_children() if legend and text else ():
+        texts = [each for each in axes.get_children() if isinstance(each, Text)] if legend and text else []
+        for title in (each for each in texts if each.get_text() == text):
             box = legend.get_window_extent()
-            if isinstance(title, Text) and title.get_text() == text and box.overlaps(title.get_window_extent()):
+            if box.overlaps(title.get_window_extent()):
                 axes.set_title(text, loc="left", pad=6.0 + 72.0 / DPI * (box.y1 - axes.get_window_extent().y1))
 
 

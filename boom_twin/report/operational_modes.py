@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.posture_modes import nearest_mode
 from ..calibration.sessions import MeasuredSession, RestPeriod, Rigging, channel_names, rest_periods
 from ..deviation.predictor import BoomPredictor
 from ..errors import BagError, UsageError
@@ -138,8 +139,7 @@ def _mode(group: Array, shape: dict[str, float], model: Array) -> dict[str, Any]
     """Return the mode of stable poles. `shape` has amplitudes in each sensor's standard deviations, relative to the largest."""
     line_damping = 0.002  # damping ratio below which it is a pump's line
     frequency, damping, frequency_sigma, damping_sigma = np.median(group, axis=0).tolist()
-    distance = 0.2  # largest relative distance of a measured mode from its mode of the model
-    near = [float(each) for each in model if abs(each - frequency) <= distance * each]
+    mode = nearest_mode(frequency, model.tolist())
     return {
         "frequency_Hz": frequency,
         "frequency_sigma_Hz": frequency_sigma,
@@ -147,6 +147,6 @@ def _mode(group: Array, shape: dict[str, float], model: Array) -> dict[str, Any]
         "damping_ratio_sigma": damping_sigma,
         "orders": len(group),  # model orders at which its pole is stable
         "is_line_of_a_load": damping < line_damping,
-        "model_Hz": min(near, key=lambda each: abs(each - frequency), default=None),
+        "model_Hz": None if mode is None else float(model[mode]),
         "shape": shape,
     }

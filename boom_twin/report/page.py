@@ -13,9 +13,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from .. import __version__
+from ..analysis.posture_modes import MODE_DISTANCE
 from ..analysis.sample_series import Vibration
 from ..offline.history import course
-from ..offline.recording import Recording, noise_told
+from ..offline.recording import noise_told
 from ..plots import AlarmSpan
 from ..plots.results import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import DEPTH_BY_GYRATION
@@ -26,7 +27,7 @@ from ..types import SECOND, SENSORS, Stream
 from .evaluation import Evaluation
 from .fatigue import LIVES, NOISE_RANGE, hours_as_text, hours_to_end, yearly_as_text
 from .quantities import Load
-from .vibration import MODE_DISTANCE, SHORTEST_REST
+from .vibration import SHORTEST_REST
 
 FILE_NAME = "report.html"
 HOUR = 3600.0  # s
@@ -106,7 +107,8 @@ def _draw(found: Evaluation, folder: Path, name: str, origin: str) -> None:
 
 def _facts(found: Evaluation) -> list[tuple[str, object]]:
     summary, recording = found.result.summary, found.result.recording
-    begin = datetime.fromtimestamp(recording.first // SECOND, UTC)
+    begin, (x, z) = datetime.fromtimestamp(recording.first // SECOND, UTC), recording.totals.tip_sigmas
+    is_judged = np.isfinite([x, z]).any()
     return [
         ("first stamp", begin.strftime("%Y-%m-%d %H:%M:%S UTC")),
         ("duration, s", summary["duration_s"]),
@@ -114,18 +116,11 @@ def _facts(found: Evaluation) -> list[tuple[str, object]]:
         ("samples left out", summary["dropped"]),
         ("largest tip acceleration, m/s²", summary["tip_acceleration_max_m_s2"]),
         ("largest tip displacement, m", float(np.hypot(*found.history.tip_displacement.T).max())),
-        *_uncertainty(recording),
+        *([("standard deviation of the predicted tip at worst, m", f"{x:.2g} forward, {z:.2g} up")] if is_judged else []),
         *((name, summary[key]) for key, name in AGAINST_TRUTH if key in summary),
         *([("load at the tip that the model does not know", summary["tip_load"])] if "tip_load" in summary else []),
         *(("noise", told) for told in noise_told(summary)),
     ]
-
-
-def _uncertainty(recording: Recording) -> list[tuple[str, object]]:
-    x, z = recording.totals.tip_sigmas
-    if not np.isfinite([x, z]).any():
-        return []
-    return [("standard deviation of the predicted tip at worst, m", f"{x:.2g} forward, {z:.2g} up")]
 
 
 def _joints(summary: dict[str, Any]) -> list[tuple[object, ...]]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.posture_modes import ModeList
+from ..analysis.posture_modes import ModeList, nearest_mode
 from ..analysis.sample_series import ORDER, Vibration, free_vibrations, is_free, spacing, unbroken
 from ..plots import History
 from ..scene.schema import Scene
@@ -17,7 +17,6 @@ STILL_SPEED = 1e-3  # m/s of a stroke, above which a boom does not stand still
 SPEED_SPAN = 0.2  # s over which that speed is taken
 SHORTEST_REST = 3.0  # s; shorter rest periods are not evaluated
 EVALUATED = 60.0  # s of a rest period that are evaluated; free vibration has died away then, and memory goes by its square
-MODE_DISTANCE = 0.2  # relative distance up to which a vibration belongs to the nearest mode of the model
 
 
 def vibrations(times: Array, values: Array) -> list[Vibration]:
@@ -112,9 +111,8 @@ def measured_motion(history: History) -> tuple[Array, Array]:
 
 def _by_mode(found: list[Vibration], model: list[float]) -> dict[int, Vibration]:
     near: dict[int, Vibration] = {}
-    for each in found if model else ():
-        mode = int(np.argmin(np.abs(np.array(model) - each.frequency)))
-        is_near = abs(each.frequency - model[mode]) <= MODE_DISTANCE * model[mode]
-        if is_near and (mode not in near or each.frequency_sigma < near[mode].frequency_sigma):
+    for each in found:
+        mode = nearest_mode(each.frequency, model)
+        if mode is not None and (mode not in near or each.frequency_sigma < near[mode].frequency_sigma):
             near[mode] = each
     return near

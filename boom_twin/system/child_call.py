@@ -13,7 +13,7 @@ from contextlib import suppress
 from typing import Any
 
 from ..errors import BoomTwinError
-from .processes import LESS_URGENT, python_command
+from .processes import LESS_URGENT, collect_rarely, python_command
 
 
 class ChildEndedError(BoomTwinError):
@@ -68,6 +68,7 @@ def _serve() -> None:
     """Answer the calls that arrive on standard input. What is printed goes to standard error."""
     for stop in (signal.SIGINT, signal.SIGHUP):  # sent to all processes of a terminal
         signal.signal(stop, signal.SIG_IGN)
+    collect_rarely()
     calls, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     os.nice(pickle.load(calls))

@@ -72,11 +72,15 @@ def check_target(path: Path, sources: Sequence[Path], own: bytes | Callable[[byt
             raise UsageError(f"{path}: is there already, and is no earlier result of this command. Name another file.")
 
 
-def check_new(path: Path, sources: Sequence[Path]) -> None:
-    """Refuse to write a file that exists and is not empty. Otherwise check it as `check_target` does."""
+def check_new(path: Path, sources: Sequence[Path], force: bool | None = None) -> None:
+    """Refuse to write what exists and is not empty, unless by ``--force`` (None: the command has no such option).
+
+    Otherwise check it as `check_target` does.
+    """
     check_target(path, sources)
-    if path.is_file() and path.stat().st_size:
-        raise UsageError(f"{path}: is there already, and is not written over. Name another file.")
+    if not force and path.exists() and path.stat().st_size:
+        remedy = "" if force is None else ", or give --force to replace it"
+        raise UsageError(f"{path}: is there already. Name another file{remedy}.")
 
 
 def _is_recording(path: Path) -> bool:

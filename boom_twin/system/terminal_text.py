@@ -1,4 +1,4 @@
-"""Standard streams: escape control characters in received text, and tolerate closed or full streams."""
+"""Text for people: control characters of received text escaped, plurals, standard streams that may be closed or full."""
 
 from __future__ import annotations
 
@@ -16,6 +16,11 @@ def printable(text: str, keep: str = "\n\t") -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in keep else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+def several(number: int, noun: str) -> str:
+    """Return a number with its noun, in the plural unless it is 1: ``2 joints``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def open_closed_streams() -> None:

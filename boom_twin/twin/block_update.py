@@ -9,17 +9,15 @@ from math import inf
 import numpy as np
 
 from ..deviation.predictor import BoomPredictor, Drawn
-from ..health.blocks import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
 from ..kernels.result_row import PIN
 from ..predictions import Outline
-from ..types import Health, Report, Residuals, Stream
+from ..types import Health, Integers, Report, Residuals, Stream
 from .blocks import (
     CODES,
     REGULAR,
     STREAMS,
     EstimateBlock,
-    Integers,
     Note,
     PredictionBlock,
     ReportBlock,
@@ -54,7 +52,7 @@ class BlockUpdate:
         self._judge, self._event_counts = judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
         drives = CODES[Stream.STROKES], limits.drive
-        self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code not in drives]
+        self._measured = [code for code in range(len(limits.channels)) if code not in drives]
         self._capacity, sizes = capacity, (2 * capacity, self._joints, boom.width, boom.stations, limits.channels)
         self._found: UpdateOutput = new_output(*sizes)
         self._begin, self._passed = (0, 0), (0, 0)
@@ -160,15 +158,14 @@ class BlockUpdate:
         (predicted, compared), self._passed = self._passed, (counts[0], counts[1])
         if counts[0] > predicted:
             own = slice(predicted, counts[0])
-            variances = found.rows[own, self._boom.places.variances].copy()
-            self._judge.blocks.predicted(PredictionRows(found.stamps[own].copy(), found.measured[own].copy(), variances))
+            read, sigmas = found.measured[own], np.sqrt(found.rows[own, self._boom.places.variances])
+            self._judge.collect(STREAMS[self.limits.drive], np.arange(len(read)), found.stamps[own], read, read, sigmas)
         streams = found.residual_streams[compared : counts[1]]
         present = set(streams.tolist())
-        for code, width in self._measured:
+        for code in self._measured:
             if code in present:
                 rows = compared + np.flatnonzero(streams == code)
-                values = (each[rows, :width] for each in (found.raw, found.values, found.sigmas))
-                self._judge.blocks.measured(STREAMS[code], MeasuredRows(found.residual_stamps[rows], *values))
+                self._judge.collect(STREAMS[code], rows, found.residual_stamps, found.raw, found.values, found.sigmas)
 
     def _predictions(self, own: slice, outlines: dict[int, Outline]) -> PredictionBlock:
         found, at = self._found, self._boom.places

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from ..deviation import estimate_row as row_at
 from ..predictions import Estimate, Outline, Prediction
-from ..types import Array, Change, Health, Report, Residuals, Sample, Stream, StrokeReading, channels_of
+from ..types import Array, Change, Health, Integers, Report, Residuals, Sample, Stream, StrokeReading, channels_of
 
-Integers = NDArray[np.int64]
 Item = TypeVar("Item")
 
 STREAMS = tuple(Stream)

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from ..deviation.estimate_row import WIDTH
 from ..deviation.sensor_model import TURN
 from ..kernels.jit import by_reference, inner
-from ..types import LIMIT, NANO, Array
+from ..types import LIMIT, NANO, Array, Integers
 
-Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 NONE = -(2**62)  # no stamp yet, ns

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.analysis.load_spectrum import LEAST, TipLoad, find_pulses, tip_load
+from boom_twin.analysis.load_spectrum import LEAST, TipLoad, TipLoadFinder, find_pulses
 
 RATE = 200.0
 UP = np.array([0.0, 1.0])
@@ -20,6 +20,13 @@ def times(seconds: float, rate: float = RATE) -> np.ndarray:
 def pulses(t: np.ndarray, frequency: float, height: float) -> np.ndarray:
     """Rectangular pulses, upward, on for half of every period; shape (k, 2)."""
     return height * ((t * frequency) % 1.0 < 0.5)[:, None] * UP
+
+
+def tip_load(t: np.ndarray, loads: np.ndarray, variances: np.ndarray) -> TipLoad | None:
+    """Load in estimates (k, 2) in N with their variances at `t` (k,) in s."""
+    finder = TipLoadFinder()
+    finder.add(np.round(t / 1e-9).astype(np.int64), loads, variances)
+    return finder.load
 
 
 def known_load(t: np.ndarray, loads: np.ndarray) -> TipLoad | None:

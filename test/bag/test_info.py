@@ -36,6 +36,8 @@ def test_the_bundled_session(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(bare[key] == values[key] for key in ("counts", "rates_Hz", "largest_gaps_s", "duration_s", "synthetic"))
     assert main(["info", str(bundled)]) == 0
     assert "nothing is missing" in capsys.readouterr().out
+    assert main(["info", str(bundled), "--start", "100"]) == 1
+    assert "no message from 100 s on; the session lasts 60.0 s" in capsys.readouterr().err
 
 
 Row = tuple[Stream, int, int, list[str]]

@@ -145,6 +145,15 @@ def test_a_broken_session_costs_its_own_row(done: Done) -> None:
     assert "incomplete: the end is missing" in row["reason"]
 
 
+def test_topics_of_a_node_in_another_namespace_are_missed(
+    sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    session, front = str(sessions / "s0"), ("--namespace", "front")
+    assert main(["batch", session, "--out", str(tmp_path / "out"), *front]) == 1
+    assert main(["compare", session, session, *front]) == 1
+    assert [text.count("/front/cylinder_strokes") > 0 for text in capsys.readouterr()] == [True, True]
+
+
 def test_the_page_needs_nothing_from_elsewhere(done: Done) -> None:
     text = (done[0] / "batch.html").read_text(encoding="utf-8")
     found = outline(done[0] / "batch.html")

@@ -84,7 +84,7 @@ def test_zeros_go_into_a_mapping_that_a_replay_takes(ran, source):
 def test_it_overwrites_only_when_told(ran, source, capsys):
     folder, arguments, _ = ran
     assert main([*arguments, "--out", str(folder / "new.yaml")]) == 1
-    assert "is there already. Name another file, or add --force" in capsys.readouterr().err
+    assert "is there already. Name another file, or give --force" in capsys.readouterr().err
     assert main([*arguments, "--out", str(source), "--force"]) == 1
     assert "this file is read. Name another one" in capsys.readouterr().err
 

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from boom_twin import Report, Sample, Settings, Stream, load_scene
+from boom_twin import Report, Sample, Stream
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import Level, Status
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch
-from boom_twin.types import USUAL_STREAMS, Residuals
+from boom_twin.texts import alarm_text
+from boom_twin.types import USUAL_STREAMS, Alarm, Health, Residuals
 
 NAMES = {stream: stream.value for stream in USUAL_STREAMS}
 REQUIRED = {stream: stream in (Stream.STROKES, Stream.ANGLES) for stream in USUAL_STREAMS}
@@ -26,9 +28,8 @@ class Rig:
 
     def __init__(self) -> None:
         self.now, self.random = 100.0, np.random.default_rng(5)
-        sensors = sensors_of(load_scene(), Settings(), REQUIRED, [None] * 4)
+        sensors = sensors_of(4, REQUIRED)
         self.watch = TwinWatch(sensors, NAMES, Thresholds(), lambda: self.now)
-        self.middle = {stream: np.array([0.5 * (s.low + s.high) for s in each]) for stream, each in sensors.items()}
         self.peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in USUAL_STREAMS}
         self.behind = dict.fromkeys(Stream, 0.0)
         self.scale, self.took, self.failing, self.swing = 1.0, 1e-4, False, 0.0
@@ -50,7 +51,7 @@ class Rig:
 
     def _message(self, stream: Stream) -> None:
         stamp = round((self.now + 1e9 - self.behind[stream]) * 1e9)
-        sample = Sample(stream, stamp, self.middle[stream] + self.random.normal(0.0, 1e-4, 4))
+        sample = Sample(stream, stamp, self.random.normal(0.3, 1e-4, 4))
         self.watch.seen(stream, stamp)
         self.watch.took(sample, self._report(stream, stamp), self.took)
 
@@ -106,6 +107,19 @@ def test_a_residual_that_grows_and_shrinks_again(rig: Rig) -> None:
     raised = next(status for status in told if status.level == Level.ERROR)
     assert raised.message == "larger than noise explains" and raised.values["window_s"] < 5.0
     assert told[13].message == raised.message and told[-1].level == Level.OK
+
+
+def test_an_alarm_of_a_sensor_is_told_with_the_sensor_while_it_lasts(rig: Rig) -> None:
+    after(rig, 2)
+    alarm, deviation = (
+        Alarm("cylinder_2", "stuck", 1, None, "cylinder_2.sensor", ""),
+        Alarm("joint_1", "deviation", 1, None, None, ""),
+    )
+    for until, level, words in ((None, Level.ERROR, alarm_text("cylinder_2", "stuck", None)), (2, Level.OK, "measuring")):
+        rig.watch.judged(Health(1, (replace(alarm, until=until), deviation), np.zeros(2), {}), 0.0)
+        found = rig.second()
+        assert (found["sensor cylinder_2"].level, found["sensor cylinder_2"].message) == (level, words)
+        assert found["sensor joint_1"].level == Level.OK
 
 
 @pytest.mark.parametrize(("swing", "level"), [(0.1, Level.OK), (0.2, Level.WARN), (0.4, Level.ERROR)])

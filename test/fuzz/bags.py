@@ -75,8 +75,9 @@ def _messages(session: Session) -> list[Message]:
     found = []
     for file in session.files:
         with as_bag_error(file.path):
-            for channel, time, data in file.messages():
-                found.append((file.channels[channel].topic, time, data))
+            for _, _, block in file.parts(set(), file.log_clock):
+                for row, (channel, time) in enumerate(zip(block.sources.tolist(), block.log_times.tolist(), strict=True)):
+                    found.append((file.channels[channel].topic, time, block.data(row)))
     return found
 
 

@@ -13,6 +13,7 @@ from recordings import write_session
 from session_readings import rows_in, samples_in
 
 from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
+from boom_twin.health.sensor_check import Block, SensorCheck, SensorFindings
 from boom_twin.types import Alarm, Health
 
 NANO = 1e-9
@@ -67,6 +68,13 @@ def run(samples: Iterable[Sample], settings: Settings | None = None, twin=None) 
     twin = twin or Twin(load_scene(), settings, health=True)
     reports = [twin.update(sample) for sample in samples]
     return Outcome(twin, reports, [r.health for r in reports if r.health is not None], samples[0].stamp)
+
+
+def look(check: SensorCheck, number: int, times: np.ndarray, raw: np.ndarray, expected=0.0) -> SensorFindings:
+    """A check takes the block of this number, with readings (k, channels) at `times` (s)."""
+    stamps = np.round(times / NANO).astype(np.int64)
+    check.collect(np.arange(len(stamps)), stamps, raw, raw - expected, np.ones_like(raw))
+    return check.take(Block(number), np.zeros(raw.shape[1], dtype=bool))
 
 
 def spoilt(samples, stream: Stream, channel: int, change, onset: float = 6.0) -> list[Sample]:

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Settings, Stream, load_scene
-from boom_twin.health.blocks import BLOCK as BLOCK_TIME
-from boom_twin.health.blocks import Block, MeasuredRows
 from boom_twin.health.lag_monitor import LagMonitor
 from boom_twin.health.monitor import HealthMonitor
-from boom_twin.health.sensor_check import SensorCheck, StreamReadings
+from boom_twin.health.sensor_check import BLOCK as BLOCK_TIME
+from boom_twin.health.sensor_check import Block, SensorCheck
 from boom_twin.offline.ground_truth import load_truth
 from boom_twin.types import NO_PLACES, Alarm, Array, StrokeReading, channels_of
 
@@ -25,12 +24,14 @@ NONE = np.zeros(2, dtype=bool)  # masked channels
 SIGMA = 1e-3  # rad, noise of a reading
 
 
-def block_of(raw: Array, expected: Array, number: int, sigma: float = SIGMA) -> StreamReadings:
-    """Return readings (k, channels), evenly in time, and the deviation that is expected of their residuals."""
+def block_of(raw: Array, expected: Array, number: int, sigma: float = SIGMA) -> SensorCheck:
+    """Return a check of readings (k, channels), evenly in time, with the deviation that is expected of their residuals."""
     count, edge = len(raw), np.zeros(raw.shape[1])
     stamps = number * BLOCK_TIME + np.arange(count) * (BLOCK_TIME // max(count, 1))
     check = SensorCheck(SIGMA, 0.0, edge, edge, 0.0)
-    return check.summary(MeasuredRows(stamps, raw, raw - expected, np.full(raw.shape, sigma)), NONE, 0.0)
+    check.collect(np.arange(count), stamps, raw, raw - expected, np.full(raw.shape, sigma))
+    check.take(Block(number), NONE)
+    return check
 
 
 def angles(times: Array) -> Array:

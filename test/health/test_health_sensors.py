@@ -11,6 +11,8 @@ from boom_twin import SceneWarning, load_scene, statics
 from boom_twin import Stream as Channels
 from boom_twin.health.sensor_check import SensorCheck, sensor_ranges
 
+from .recorded import look
+
 SIGMA, RESOLUTION, PERIOD, ROWS = 1.745e-4, 8.727e-5, 0.005, 20
 LOW, HIGH = np.full(4, -1.0), np.full(4, 1.0)
 
@@ -28,7 +30,7 @@ class Stream:
         read = expected + self.rng.normal(0.0, self.sigma, expected.shape)
         raw = change(stamps, np.round(read / self.resolution) * self.resolution if self.resolution else read)
         self.block += 1
-        return self.check.look(stamps[kept], raw[kept], expected[kept], self.block * ROWS * PERIOD)
+        return look(self.check, self.block - 1, stamps[kept], raw[kept], expected[kept])
 
     def rounded(self, values):
         """Readings of constant `values` (4,)."""
@@ -106,6 +108,22 @@ def test_stuck():
     only(stream.found(10, change=change), "stuck", 2, 1.0)
 
 
+def test_all_stuck():
+    """As of a driver that sends its last message again and again. They had noise before."""
+    stream, last = started(1), []
+
+    def change(times, raw):
+        last.append(raw[0].copy())
+        raw[:] = last[0]
+        return raw
+
+    assert set(stream.found(10, motion=lambda times: np.full_like(times, 0.3), change=change)) >= {
+        ("stuck", i) for i in range(4)
+    }
+    found = [stream.look(motion=lambda times: np.full_like(times, 0.3), change=change) for _ in range(100)]
+    assert all(each.flags["stuck"].all() for each in found)
+
+
 @pytest.mark.parametrize("times", [3.5, 5.0, 10.0])
 def test_noisy(times):
     """Much noise looks like spikes and jumps, too; of this sensor alone."""
@@ -124,17 +142,17 @@ def test_haste_is_no_noise_at_fifty_hertz_and_noise_is():
     rng, sigma = np.random.default_rng(8), 2e-5
     check = SensorCheck(sigma, 5e-6, LOW, HIGH, 0.5)
 
-    def look(block, scale):
+    def at(block, scale):
         stamps = 0.1 * block + 0.02 * np.arange(5)
         share = np.abs((stamps / 1.6 + 1.0) % 2.0 - 1.0)
         moving = 0.2 * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
         readings = np.column_stack([moving, *([np.full(5, 0.3)] * 3)]) + rng.normal(0.0, scale * sigma, (5, 4))
-        return check.look(stamps, readings, np.zeros((5, 4)), stamps[-1] + 0.02)
+        return look(check, block, stamps, readings)
 
     for block in range(400):
-        found = look(block, 1.0)
+        found = at(block, 1.0)
         assert found.flags == {}
-    found = [look(block, np.array([4.0, 1.0, 1.0, 1.0])) for block in range(400, 440)]
+    found = [at(block, np.array([4.0, 1.0, 1.0, 1.0])) for block in range(400, 440)]
     assert all(each.flags["noise"].tolist() == [True, False, False, False] for each in found[-20:])
 
 
@@ -144,11 +162,11 @@ def test_uneven_stamps_of_a_fast_cylinder_are_no_noise(are_of_readings):
     rng, sigma = np.random.default_rng(9), 2e-5
     check = SensorCheck(sigma, 5e-6, LOW, HIGH, 0.5)
     for block in range(400):
-        even = 0.1 * block + 0.005 * np.arange(20)
+        even = 0.1 * block + 0.001 + 0.0049 * np.arange(20)
         stamps = even + rng.uniform(-2.5e-4, 2.5e-4, 20)
         moving = 0.3 * np.sin(2.0 * (stamps if are_of_readings else even))
         readings = np.column_stack([moving, *([np.full(20, 0.3)] * 3)]) + rng.normal(0.0, sigma, (20, 4))
-        found = check.look(stamps, readings, np.zeros((20, 4)), 0.1 * block + 0.1)
+        found = look(check, block, stamps, readings)
         assert found.flags == {}
 
 
@@ -161,16 +179,16 @@ def test_all_noisier_than_stated_is_no_fault_but_told():
     """A data sheet that is wrong: at 50 Hz, where a second has few readings, one of four sensors often seemed faulty."""
     check, rng = SensorCheck(SIGMA, 0.0, LOW, HIGH, 0.0), np.random.default_rng(21)
 
-    def look(block, scale):
+    def noisy(block, scale):
         stamps = 0.1 * block + 0.02 * np.arange(5)
-        found = check.look(stamps, rng.normal(0.0, 1.0, (5, 4)) * scale, np.zeros((5, 4)), 0.1 * block + 0.1)
+        found = look(check, block, stamps, rng.normal(0.0, 1.0, (5, 4)) * scale)
         return found.flags.get("noise", np.zeros(4, dtype=bool))
 
-    assert not any(look(block, 2.2 * SIGMA).any() for block in range(1200))
+    assert not any(noisy(block, 2.2 * SIGMA).any() for block in range(1200))
     assert check.noise == pytest.approx(2.2, rel=0.15)
-    found = np.array([look(block, SIGMA * np.array([2.2, 2.2, 11.0, 2.2])) for block in range(1200, 1240)])
+    found = np.array([noisy(block, SIGMA * np.array([2.2, 2.2, 11.0, 2.2])) for block in range(1200, 1240)])
     assert found[-10:, 2].all() and not found[:, [0, 1, 3]].any()
-    found = np.array([look(block, 30.0 * SIGMA) for block in range(1240, 1280)])  # all are wild: no data sheet is so wrong
+    found = np.array([noisy(block, 30.0 * SIGMA) for block in range(1240, 1280)])  # all are wild: no data sheet is so wrong
     assert found[-10:].all()
 
 

@@ -11,14 +11,13 @@ from drive_twin import PUMP_DRIVES
 
 PUMP = Path(__file__).parents[2] / "bags" / "pump_session"
 
-ONCE = [1] * 5
+ONCE = [1] * 4
 CODE = """
 import sys
 from pathlib import Path
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import mapping_of, scene_of, strokes_of
-from boom_twin.health.sensor_findings import find
-from boom_twin.health.sensor_survey import summarise, survey
+from boom_twin.health.sensor_findings import collect, examine
 from boom_twin.offline.session_samples import SessionSamples
 from boom_twin.twin.blocks import SampleBlock
 from boom_twin.twin.twin import Twin
@@ -29,7 +28,7 @@ scene, mapped = scene_of(path, None).scene, mapping_of(path, None, 4, "")
 topics = mapped.topics
 twin = Twin(scene, health=True, reads=strokes_of(path, mapped).reading)
 twin.warm_up()
-kernels = update, write_residual, survey, summarise, find
+kernels = update, write_residual, collect, examine
 ready = [len(kernel.dispatcher.signatures) for kernel in kernels]
 session = scan(path)
 told = 0

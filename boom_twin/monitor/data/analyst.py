@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import find_peaks
 
-from ...analysis.posture_modes import MOVED, ModeList
+from ...analysis.posture_modes import MOVED, ModeList, nearest_mode
 from ...analysis.sample_series import SEGMENT, power_density, spacing
 from ...types import Array
 from ..protocol import SPECTRUM, pack
@@ -107,8 +107,9 @@ class Analyst:
             found = await asyncio.to_thread(spectrum, times, values[:, signal.columns].astype(float))
             if found is None:
                 return None
-            natural = await asyncio.to_thread(self._natural, self._feed.strokes(time))
-            moved = self._moved(time)
+            strokes = self._feed.strokes_between(time - SPECTRUM_SPAN, time)
+            moved = float(np.ptp(strokes, axis=0).max()) if strokes.size else 0.0
+            natural = await asyncio.to_thread(self._natural, strokes)
             number = list(store.tables).index(signal.table)
             block = pack(SPECTRUM, number, found.frequencies, found.densities.astype("f4"))
             peaks = [self._placed(peak, natural if moved <= MOVED else []) for peak in found.peaks]
@@ -127,23 +128,17 @@ class Analyst:
                     return signal
         return PREDICTION
 
-    def _moved(self, time: float) -> float:
-        strokes = self._feed.strokes_between(time - SPECTRUM_SPAN, time)
-        return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
-
     @staticmethod
     def _placed(peak: dict[str, float], natural: list[float]) -> dict[str, Any]:
         """Return a peak with the number of its mode and its deviation from the model; None without a mode near it."""
-        mode_distance = 0.2  # relative distance up to which a peak is taken for a mode of the model
-        frequency = peak["frequency"]
-        mode = int(np.argmin(np.abs(np.array(natural) - frequency))) + 1 if natural else 0
-        if not mode or abs(natural[mode - 1] - frequency) > mode_distance * natural[mode - 1]:
+        if (mode := nearest_mode(peak["frequency"], natural)) is None:
             return {**peak, "mode": None, "deviation": None}
-        return {**peak, "mode": mode, "deviation": frequency / natural[mode - 1] - 1.0}
+        return {**peak, "mode": mode + 1, "deviation": peak["frequency"] / natural[mode] - 1.0}
 
-    def _natural(self, strokes: list[float]) -> list[float]:
+    def _natural(self, strokes: Array) -> list[float]:
+        """Return the natural frequencies (Hz) at the last of the strokes (k, n); none if they or the scene are not known."""
         scene = self._feed.scene()
-        if scene is None or len(strokes) != len(scene.joints):
+        if scene is None or not len(strokes) or strokes.shape[1] != len(scene.joints):
             return []
         self._modes = self._modes or ModeList(scene)
-        return self._modes.at(strokes)
+        return self._modes.at(strokes[-1].tolist())

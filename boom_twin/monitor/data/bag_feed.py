@@ -137,11 +137,10 @@ class TwinView:
 
     def __init__(self, feed: Feed, topics: Topics, twin: Twin) -> None:
         self._feed, self._time, self.twin = feed, 0.0, twin
-        scene, settings, mounts = twin.scene, twin.settings, twin.mounts
-        self._encoder = ReportEncoder(scene, settings)
+        self._encoder = ReportEncoder(twin.scene, twin.settings)
         self._names = {key: topic.absolute for key, topic in topics.outputs.items() if topic.absolute in feed.topic_rows.names}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}
-        sensors = sensors_of(scene, settings, required, mounts, topics.absent)
+        sensors = sensors_of(twin.plan.joints, required, topics.absent)
         names = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._watch = TwinWatch(sensors, names, Thresholds(), lambda: self._time)
         self._peers = {stream: Peers(topic.absolute) for stream, topic in topics.inputs.items()}

@@ -51,22 +51,12 @@ class Feed:
             self._scene = load_scene()
         return self._scene
 
-    def strokes(self, time: float) -> list[float]:
-        """Return the strokes (m) of the drives at `time` (s); empty if they are not known."""
-        table = self.store.tables.get("shape")
-        end = 0 if table is None else table.until(time)
-        return [stroke for row in self._strokes_of(end - 1, end).tolist() for stroke in row]
-
     def strokes_between(self, first: float, last: float) -> Array:
         """Return the strokes (m) of the drives from one time to another (s), a row for each known shape, shape (k, n)."""
-        table = self.store.tables.get("shape")
-        return self._strokes_of(0, 0) if table is None else self._strokes_of(table.until(first), table.until(last))
-
-    def _strokes_of(self, first: int, end: int) -> Array:
         table, scene = self.store.tables.get("shape"), self.scene()
         if table is None:
             return np.zeros((0, 0))
-        rows, names = table.rows(first, end)[1].astype(float), table.columns
+        rows, names = table.rows(table.until(first), table.until(last))[1].astype(float), table.columns
         strokes, forces = (rows[:, [name.startswith(kind) for name in names]] for kind in ("stroke_", "force_"))
         if scene is None or not strokes.shape[1] == forces.shape[1] == len(scene.joints):
             return strokes

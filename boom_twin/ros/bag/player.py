@@ -128,10 +128,6 @@ class Player:
             if not first <= stamp < end:
                 continue
             while period and tick <= stamp:
-                yield tick, CLOCK, _clock_at(tick)
+                yield tick, CLOCK, Clock(clock=Time(sec=tick // SECOND, nanosec=tick % SECOND))
                 tick += period
             yield stamp, name, data
-
-
-def _clock_at(stamp: int) -> Clock:
-    return Clock(clock=Time(sec=stamp // SECOND, nanosec=stamp % SECOND))

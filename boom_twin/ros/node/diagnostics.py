@@ -134,7 +134,7 @@ class Diagnostics:
 
     def configure(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """Watch a newly configured twin."""
-        sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts, twin.absent)
+        sensors = sensors_of(twin.plan.joints, self._required, twin.absent)
         self._lags = lambda: twin.clocks
         self.watch = TwinWatch(sensors, self._inputs, self.watch.thresholds)
         self._queue.oddities.clear()

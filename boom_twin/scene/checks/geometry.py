@@ -34,7 +34,8 @@ def placed_pins(draft: Draft) -> Findings:
     for i, joint in enumerate(scene.joints[1:], 1):
         assert joint.C is not None and joint.D is not None and joint.E is not None
         length, first, last = scene.sections[i - 1].length, _bending(scene, i - 1)[1], _bending(scene, i)[0]
-        if _far(length, (length + joint.C[0], joint.C[1])):
+        x, y = joint.C
+        if not -1.25 * length <= x <= 0.25 * length or abs(y) > 0.5 * length:
             bound = f"C lies far outside sections[{i - 1}], which is {length:g} m long"
             remedy = "C is measured from the OUTBOARD pivot of the section before, so its x is negative."
             yield draft.warning(("joints", i, "C"), joint.C, bound, remedy)
@@ -51,11 +52,6 @@ def placed_pins(draft: Draft) -> Findings:
 def _bending(scene: Scene, i: int) -> Point:
     """Return the ends of the flexible part of section `i`; inf, -inf if it is rigid."""
     return scene.sections[i].beam or RIGID if scene.is_flexible(i) else RIGID
-
-
-def _far(length: float, point: Point) -> bool:
-    """Return True if a point is more than a quarter of the length beyond the section's ends, or half of it beside."""
-    return not -0.25 * length <= point[0] <= 1.25 * length or abs(point[1]) > 0.5 * length
 
 
 # -- a joint over its range -----------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import math
 import re
 
 from ...errors import ABSENT
+from ...system.terminal_text import several
 from ..block_reader import meaning_of
 from ..schema import Base, Cylinder, Joint, Oil, Point, Section
 from . import Draft, Findings
@@ -23,11 +24,11 @@ def counts(draft: Draft) -> Findings:
     """Check that each section has one joint, and one angle in every posture."""
     number = len(draft.scene.sections)
     if len(draft.scene.joints) != number:
-        bound = f"there are {_several(number, 'section')}, and every section has one joint"
+        bound = f"there are {several(number, 'section')}, and every section has one joint"
         yield draft.fault(("joints",), len(draft.scene.joints), bound, "Add or remove joints or sections.")
     for name, angles in draft.scene.postures.items():
         if len(angles) != number:
-            bound = f"it has {_several(len(angles), 'angle')}, the boom has {_several(number, 'section')}"
+            bound = f"it has {several(len(angles), 'angle')}, the boom has {several(number, 'section')}"
             remedy = "Give one angle per section, degrees to the horizontal."
             yield draft.fault(("postures", name), angles, bound, remedy)
 
@@ -154,10 +155,6 @@ def _range(draft: Draft, i: int, joint: Joint) -> Findings:
         shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in joint.range_deg)
         bound = "both are within 6.28 degrees, and joints of booms turn further: radians?"
         yield draft.fault(place, joint.range_deg, bound, f"Give degrees; these radians would be [{shown}].")
-
-
-def _several(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def worn_pins(draft: Draft) -> Findings:

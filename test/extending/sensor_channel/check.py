@@ -45,7 +45,7 @@ for stamp, row in zip((10**9 + np.round(times / NANO)).astype(int).tolist(), str
 # Through a twin, watched as the node watches its own.
 topics = load_topics()
 required = {stream: topic.required for stream, topic in topics.inputs.items()}
-sensors, names = sensors_of(scene, Settings(), required, [None] * 4), {s: topic.name for s, topic in topics.inputs.items()}
+sensors, names = sensors_of(4, required), {s: topic.name for s, topic in topics.inputs.items()}
 now = 0.0
 watch, twin = TwinWatch(sensors, names, Thresholds(), lambda: now), Twin(scene, health=True)
 watch.begin()
