@@ -212,18 +212,18 @@ class FaultSearch:
         if verdict.place not in found or min(rivals, default=math.inf) < self._decision.sure:
             self._unsure[verdict.place] = verdict.evidence + self._decision.sure
             return []
-        sized, spread, onset, _ = found[best]
+        sized, spread, onset, _, whole = found[best]
         if fault.kind == "off" and abs(sized.size) < self._certain * spread:  # its zero still drifts
             return []
         if (before := next((each for each in self._named if each.cause == sized.cause), None)) is not None:
-            return self._changed_size(before, sized, spread, onset)
+            return self._changed_size(before, sized, spread, onset, whole)
         named = sized.signed()
         evidence = evidence_of(named, spread) if named.is_told else ""
         part = (named.kind, named.size, spread, named.unit)
         ranked = verdict.ranked if len(likely) == 1 else self._ranked(verdict, likely)
         causes = tuple(Ranked(cause, p, (part,) if cause == named.cause else ()) for cause, p in ranked)
         alarm = self._named[named] = Alarm(named.channel, named.kind, onset, None, named.cause, evidence, causes)
-        self._begin(0 if named.kind == "off" else onset)  # the seconds before were of another boom
+        self._begin(whole)  # the seconds before were of another boom
         return [alarm] if named.is_told else []
 
     def _ranked(self, verdict: Verdict, likely: dict[int, float]) -> list[tuple[str, float]]:
@@ -245,13 +245,13 @@ class FaultSearch:
         is_off = any(each.cause == f"joint_{number}.sensor" for each in self._named)
         return is_off or number - 1 in self._creep.creeping or age < CREEP_SPAN * SECOND
 
-    def _changed_size(self, named: Fault, change: Fault, spread: float, onset: int) -> list[Alarm]:
+    def _changed_size(self, named: Fault, change: Fault, spread: float, onset: int, whole: int) -> list[Alarm]:
         """Change the size of a named fault; if the rest is that of a healthy boom, end the fault and return its alarm."""
         left = named.changed_by(change)
         if abs(left.size) < self._certain * math.hypot(spread, usual_size(self._scene, left, self._settings.scene_error)):
             return self._ended(named, onset)
         self._named[left] = self._named.pop(named)
-        self._begin(onset)
+        self._begin(whole)
         return []
 
     def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
@@ -270,8 +270,8 @@ class FaultSearch:
                     return fault
         return None
 
-    def _sized(self, fault: Fault, onset: int, healthy: Array) -> tuple[Fault, float, int, float] | None:
-        """Return the fault of the most likely size, the size's deviation, the fault's onset (ns), the log posterior.
+    def _sized(self, fault: Fault, onset: int, healthy: Array) -> tuple[Fault, float, int, float, int] | None:
+        """Return the fault of the most likely size, its deviation, the onset (ns), the log posterior, and from when it is whole.
 
         `healthy` is the course of the boom as believed, and `onset` that of a sensor's zero, which does not depend on it.
         Return None if the size is not certainly above that of healthy booms, if the seconds do not agree, or if the size of a
@@ -283,15 +283,15 @@ class FaultSearch:
             spread = math.hypot(spread, usual)
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
             is_known = abs(changed.size) > max(least, self._certain * spread)
-            return (changed, math.hypot(spread, drift), onset, 0.0) if is_known else None
+            return (changed, math.hypot(spread, drift), onset, 0.0, 0) if is_known else None
         least, sure = self._certain * usual, self._decision.sure
         found = likeliest(fault.size, least, sure, lambda size: self._course(fault._replace(size=size)) - healthy)
         if found is None:
             return None
         spread = math.hypot(found.spread, usual)
         is_known = abs(found.size) > self._certain * spread and found.agreement > math.sqrt(2.0 * sure)
-        begun = list(self._maker.recent)[-self._age :][found.onset].stamp
-        return (fault._replace(size=found.size), spread, begun, found.probability) if is_known else None
+        begun, whole = (list(self._maker.recent)[-self._age :][each].stamp for each in (found.onset, found.whole))
+        return (fault._replace(size=found.size), spread, begun, found.probability, whole) if is_known else None
 
     def _course(self, fault: Fault) -> Array:
         """Return the log likelihood of each second that counts as evidence, with a fault beside the named ones."""
