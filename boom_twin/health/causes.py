@@ -66,7 +66,8 @@ class Likeliest(NamedTuple):
     """Most likely size of a fault.
 
     spread : standard deviation by the jackknife over seconds, valid for an inexact model. onset : number of the first second
-    from which this size, or half of it, is likelier than none: a fault grows to its size. probability : log posterior
+    from which this size, or half of it, is likelier than none: a fault grows to its size. whole : number of the first second
+    from which this size is likelier than half of it. probability : log posterior
     probability density, up to a constant common to all faults. agreement : sum of the gains of all seconds over the root of the
     sum of their squares. If gains are independent and symmetric about zero, it exceeds t with a probability below exp(-t^2/2)
     (B. Efron, J. Amer. Stat. Assoc. 64 (1969), 1278-1302). Each gain is bounded by the evidence that a name needs.
@@ -75,6 +76,7 @@ class Likeliest(NamedTuple):
     size: float
     spread: float
     onset: int
+    whole: int
     probability: float
     agreement: float
 
@@ -249,6 +251,8 @@ def likeliest(size: float, least: float, sure: float, gain: Callable[[float], Ar
         without = 0.5 * np.diff(slopes + 2.0 * curves * change, append=0.0) / (curves[0] + np.diff(curves, append=0.0))
     found = sizes[best] + change
     probability = INDEPENDENT * float(gains[best][first]) - 0.5 * (found / size) ** 2
-    own = np.clip(INDEPENDENT * gain(found)[first:], -sure, sure)
-    agreement, half = float(own.sum() / max(np.linalg.norm(own), TINY)), int(gained(0.5 * found).argmax())
-    return Likeliest(found, float(np.linalg.norm(without)), min(first, half), probability, agreement)
+    full, half = gain(found), gain(0.5 * found)
+    own = np.clip(INDEPENDENT * full[first:], -sure, sure)
+    agreement = float(own.sum() / max(np.linalg.norm(own), TINY))
+    onset, whole = (int(each[::-1].cumsum()[::-1].argmax()) for each in (half, full - half))
+    return Likeliest(found, float(np.linalg.norm(without)), min(first, onset), whole, probability, agreement)

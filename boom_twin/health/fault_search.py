@@ -2,13 +2,14 @@
 
 The filter of a twin gives its innovations and the log likelihood of all readings (`BoomPredictor.evidence`). A fault twin has a
 scene with one fault, or lets a sensor's zero drift. `causes` decides which fault is probable. Further twins find its size. A
-named fault becomes part of the boom as believed. So a second fault, and the end of the first, are found in the same way.
+named fault becomes part of the boom as believed since its onset. So a second fault is found in the same way.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import repeat
@@ -17,7 +18,6 @@ from statistics import NormalDist
 import numpy as np
 
 from ..config.settings import Settings
-from ..deviation.states import Innovations
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Ranked, Stream, StrokeReading
 from .causes import INDEPENDENT, MEMORY, Evidence, Verdict, likeliest, scores
@@ -39,6 +39,37 @@ from .sensor_check import CAME_BACK
 
 DELAY = 2  # s from the end of a second to its verdict
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
+
+
+class EndTest:
+    """Test for the end of a named fault, by twins of the boom as believed and of that boom without the fault.
+
+    A twin learns zeros and a load that fit its boom. What it learned before an end misleads it afterwards. So each second both
+    twins restart from the `SETTLING` seconds before, until the boom without the fault is likelier since their start (E. Page,
+    Biometrika 41 (1954), 100-115).
+    """
+
+    def __init__(self, maker: TwinMaker, known: tuple[Fault, ...], fault: Fault) -> None:
+        self.fault, self._maker = fault, maker
+        self._booms = known, tuple(each for each in known if each is not fault)
+        self._pair: list[tuple[Hypothesis, Follower]] = []
+        self._recent: deque[Second] = deque(maxlen=SETTLING + 1)
+        self._sum = 0.0  # evidence since the twins' start
+
+    def gain(self, second: Second, sure: float) -> float:
+        """Return the log likelihood of a second without the fault less that with it; `sure` bounds its share of the sum."""
+        self._recent.append(second)
+        seconds = [second]
+        if not self._sum > 0.0:
+            self._sum, self._pair, seconds = 0.0, [self._maker.twin(boom) for boom in self._booms], [*self._recent]
+        for each in seconds:
+            before = [twin.evidence for _, twin in self._pair]
+            for own, twin in self._pair:
+                feed(twin, own, each)
+        believed, without = (twin.evidence - old for (_, twin), old in zip(self._pair, before, strict=True))
+        if len(self._recent) > SETTLING:
+            self._sum += min(max(INDEPENDENT * (without - believed), -sure), sure)
+        return without - believed
 
 
 class FaultSearch:
@@ -74,51 +105,31 @@ class FaultSearch:
         self._hypotheses: list[Hypothesis] = []
         self._twins: list[Follower] = []  # made when the first streams have come
 
-    def _begin(self) -> None:
-        """Make twins of the boom as believed, of that boom without each named fault, and of that boom with each other fault.
+    def _begin(self, since: int = 0) -> None:
+        """Make twins of the boom as believed since a stamp (ns), and of that boom with each other fault; discard all evidence.
 
-        A further twin of a named fault that has a size lets that size grow or shrink. The end of a sensor fault shows in its
-        estimated zero.
+        All take the recent seconds since then, which are evidence like those to come. A further twin of a named fault that has
+        a size lets that size grow or shrink. The end of a sensor fault shows in its estimated zero.
         """
         known = tuple(self._named)
         causes = {fault.cause for fault in known if not fault.is_size}
-        possible = possible_faults(self._scene, self._reads, self._streams)
-        ends = [fault for fault in known if fault.kind != "off"]
-        fewer = [(fault._replace(kind="ended"), tuple(each for each in known if each is not fault)) for fault in ends]
-        more = [(fault, (*known, fault)) for fault in possible if fault.cause not in causes]
-        faults, booms = zip((None, known), *fewer, *more, strict=True)
-        found = [(fault, *each) for fault, each in zip(faults, self._cores.map(self._maker.warm, booms), strict=True) if each]
-        self._faults = [fault for fault, _, _ in found if fault is not None]
-        self._hypotheses, self._twins = [each for _, each, _ in found], [twin for _, _, twin in found]
-        self._decide_anew()
-
-    def _believe(self, fault: Fault, place: int = 0) -> None:
-        """Add a named fault (twin `place`) to the boom as believed, or remove it (0); restart twins unless a sensor is off."""
-        if fault.kind != "off":
-            return self._begin()
-        channels = hypothesis(self._scene, (fault,)).doubted
-        if place:
-            self._twins[0], self._hypotheses[0] = self._twins.pop(place), self._hypotheses.pop(place)
-            del self._faults[place - 1]
-        doubted = [each.doubted | channels if place else each.doubted - channels for each in self._hypotheses]
-        for i, (twin, own) in enumerate(zip(self._twins, doubted, strict=True)):
-            twin.doubt(own)
-            self._hypotheses[i] = self._hypotheses[i]._replace(doubted=own)
-        if not place and (found := self._maker.warm((*self._named, fault))) is not None:
-            self._hypotheses.append(found[0])
-            self._twins.append(found[1])
-            self._faults.append(fault._replace(size=0.0))
-        return self._decide_anew()
-
-    def _decide_anew(self) -> None:
-        """Discard all evidence of faults."""
-        self._certain = NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - self._settings.name_odds) / len(self._faults))  # Bonferroni
-        errors = [usual_size(self._scene, fault, self._settings.scene_error) for fault in self._faults]
-        named = {fault.cause for fault in self._named}
-        self._decision, self._age = Evidence(self._scene, self._faults, self._settings, errors, self._certain, named), -SETTLING
-        self._quiet = 0.0  # evidence that the filters expect too much unknown force
+        possible = [each for each in possible_faults(self._scene, self._reads, self._streams) if each.cause not in causes]
+        made = list(self._cores.map(self._maker.possible, [known, *((*known, fault) for fault in possible)]))
+        self._faults = [fault for fault, each in zip(possible, made[1:], strict=True) if each is not None]
+        self._hypotheses, self._twins = map(list, zip(*(each for each in made if each is not None), strict=True))
+        self._ends = [EndTest(self._maker, known, fault) for fault in known if fault.kind != "off"]
+        faults = [*self._faults, *(each.fault._replace(kind="ended") for each in self._ends)]
+        self._certain = NormalDist().inv_cdf(1.0 - 0.5 * (1.0 - self._settings.name_odds) / len(faults))  # Bonferroni
+        errors = [usual_size(self._scene, fault, self._settings.scene_error) for fault in faults]
+        named = {fault.cause for fault in known}
+        self._decision, self._age = Evidence(self._scene, faults, self._settings, errors, self._certain, named), -SETTLING
         self._unsure: dict[int, float] = {}  # evidence of faults below which their sizes are not looked for again
-        self._evidence = np.array([twin.evidence for twin in self._twins])
+        self._evidence, self._quiet = np.zeros(len(self._twins)), 0.0
+        self._maker.forget(since)
+        for second in self._maker.recent:
+            self._feed(second)
+            self._weigh(second)
+        self._quiet = 0.0  # evidence that the filters expect too much unknown force; that of these seconds has been used
 
     def close(self) -> None:
         """End the threads; a call that they work for fails."""
@@ -128,10 +139,8 @@ class FaultSearch:
         """Let all twins take a second or a change; return the alarms that begin or end."""
         if second.change is not None:
             self._maker.restart(second.change)
-            for each, twin in zip(self._hypotheses, self._twins, strict=True):
-                twin.requests.repeat(each.changed(second.change))
             if self._twins:
-                self._decide_anew()
+                self._begin()
             return []
         come = {list(Stream)[code] for code in np.unique(second.block.streams)}
         if not come <= self._streams:
@@ -143,45 +152,39 @@ class FaultSearch:
         self._maker.recent.append(second)
         leaks = [] if self._reads is StrokeReading.ANGLE else self._creep.take(second.stamp, second.block)
         if leaks:
-            self._decide_anew()
+            self._begin(second.stamp + SECOND)
         doubts = self._twins[0].doubts
-        list(self._cores.map(feed, self._twins, self._hypotheses, repeat(second)))  # waits for all, and raises what one raised
-        innovations = [twin.take_innovations() for twin in self._twins]
+        self._feed(second)
         if self._twins[0].doubts > doubts or math.isnan(self._twins[0].evidence):
-            self._maker.recent.clear()  # it has half forgotten zeros and load; any other would gain by what it still knows
+            self._begin(second.stamp + SECOND)  # it has half forgotten zeros and load; others would gain by what they know
+            return leaks
+        verdict = self._weigh(second)
+        if (fault := self._back_again()) is not None:
+            return [*leaks, *self._ended(fault, second.stamp)]
+        if self._quiet > self._decision.sure:  # filters that expect too much load follow noise, and a load would pay
+            self._maker.expects *= QUIET
             self._begin()
             return leaks
-        return [*leaks, *self._decided(second.stamp, innovations)]
+        return [*leaks, *([] if verdict is None else self._name(verdict, second.stamp))]
 
-    def _decided(self, stamp: int, innovations: Sequence[Innovations]) -> list[Alarm]:
-        """Return the alarms of named faults that begin or end with the evidence of a second."""
+    def _feed(self, second: Second) -> None:
+        """Let all twins take a second."""
+        list(self._cores.map(feed, self._twins, self._hypotheses, repeat(second)))  # waits for all, and raises what one raised
+
+    def _weigh(self, second: Second) -> Verdict | None:
+        """Add the evidence of a second that all twins have taken; return the verdict if a fault, or an end, is probable."""
+        innovations = [twin.take_innovations() for twin in self._twins]
         before, self._evidence = self._evidence, np.array([twin.evidence for twin in self._twins])
         grown = self._evidence - before
+        grown = np.append(grown, [grown[0] + each.gain(second, self._decision.sure) for each in self._ends])
         grown[np.isnan(grown)] = np.nanmin(grown)  # a twin that diverged is as unlikely as the least likely one
         self._age += 1
         if self._age <= 0:
-            return []
-        if (fault := self._back_again()) is not None:
-            return self._ended(fault, stamp)
-        sized = [(each, fault.size) for each, fault in zip(innovations[1:], self._faults, strict=True) if fault.is_size]
-        verdict = self._decision.take(stamp, grown, scores(innovations[0], *zip(*sized, strict=True)))
+            return None
         quieter = next((place for place, each in enumerate(self._faults, 1) if each.kind == "quieter"), 0)
         self._quiet += INDEPENDENT * float(grown[quieter] - grown[0])
-        if self._quiet > self._decision.sure:
-            self._expect_less()
-            return []
-        return [] if verdict is None else self._name(verdict, stamp)
-
-    def _expect_less(self) -> None:
-        """Let all filters expect less unknown force: a filter that expects too much follows noise, and a load would pay.
-
-        The twins have settled on the recent seconds, and the evidence of faults that there is still counts.
-        """
-        self._maker.expects *= QUIET
-        faults, decision, age = self._faults, self._decision, self._age
-        self._begin()
-        if faults == self._faults:
-            self._decision, self._age = decision, age
+        sized = [(each, fault.size) for each, fault in zip(innovations[1:], self._faults, strict=True) if fault.is_size]
+        return self._decision.take(second.stamp, grown, scores(innovations[0], *zip(*sized, strict=True)))
 
     def _name(self, verdict: Verdict, stamp: int) -> list[Alarm]:
         """Name the fault of a verdict, change its size, or end it; return its alarm if it begins or ends.
@@ -190,9 +193,10 @@ class FaultSearch:
         most likely one, each at its own size, is named by the odds required for a name. Otherwise all are sized again once
         the evidence has grown by these odds.
         """
-        fault, begin = self._faults[verdict.place], verdict.onset
-        if fault.kind == "ended":
-            return self._ended(next(each for each in self._named if each.cause == fault.cause), begin)
+        begin = verdict.onset
+        if verdict.place >= len(self._faults):
+            return self._ended(self._ends[verdict.place - len(self._faults)].fault, begin)
+        fault = self._faults[verdict.place]
         is_softer = fault.kind == "softer" and verdict.sizes[verdict.place] > 0.0
         if (is_softer and self._may_leak(fault, stamp - begin)) or verdict.evidence < self._unsure.get(verdict.place, 0.0):
             return []
@@ -208,18 +212,18 @@ class FaultSearch:
         if verdict.place not in found or min(rivals, default=math.inf) < self._decision.sure:
             self._unsure[verdict.place] = verdict.evidence + self._decision.sure
             return []
-        sized, spread, onset, _ = found[best]
+        sized, spread, onset, _, whole = found[best]
         if fault.kind == "off" and abs(sized.size) < self._certain * spread:  # its zero still drifts
             return []
         if (before := next((each for each in self._named if each.cause == sized.cause), None)) is not None:
-            return self._changed_size(before, sized, spread, onset)
+            return self._changed_size(before, sized, spread, onset, whole)
         named = sized.signed()
         evidence = evidence_of(named, spread) if named.is_told else ""
         part = (named.kind, named.size, spread, named.unit)
         ranked = verdict.ranked if len(likely) == 1 else self._ranked(verdict, likely)
         causes = tuple(Ranked(cause, p, (part,) if cause == named.cause else ()) for cause, p in ranked)
         alarm = self._named[named] = Alarm(named.channel, named.kind, onset, None, named.cause, evidence, causes)
-        self._believe(named, best + 1)
+        self._begin(whole)  # the seconds before were of another boom
         return [alarm] if named.is_told else []
 
     def _ranked(self, verdict: Verdict, likely: dict[int, float]) -> list[tuple[str, float]]:
@@ -241,19 +245,19 @@ class FaultSearch:
         is_off = any(each.cause == f"joint_{number}.sensor" for each in self._named)
         return is_off or number - 1 in self._creep.creeping or age < CREEP_SPAN * SECOND
 
-    def _changed_size(self, named: Fault, change: Fault, spread: float, onset: int) -> list[Alarm]:
+    def _changed_size(self, named: Fault, change: Fault, spread: float, onset: int, whole: int) -> list[Alarm]:
         """Change the size of a named fault; if the rest is that of a healthy boom, end the fault and return its alarm."""
         left = named.changed_by(change)
         if abs(left.size) < self._certain * math.hypot(spread, usual_size(self._scene, left, self._settings.scene_error)):
             return self._ended(named, onset)
         self._named[left] = self._named.pop(named)
-        self._begin()
+        self._begin(whole)
         return []
 
     def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
         """End a named fault at a stamp (ns); return its alarm."""
         alarm = replace(self._named.pop(fault), until=stamp)
-        self._believe(fault)
+        self._begin(stamp)
         return [alarm] if fault.is_told else []
 
     def _back_again(self) -> Fault | None:
@@ -266,8 +270,8 @@ class FaultSearch:
                     return fault
         return None
 
-    def _sized(self, fault: Fault, onset: int, healthy: Array) -> tuple[Fault, float, int, float] | None:
-        """Return the fault of the most likely size, the size's deviation, the fault's onset (ns), the log posterior.
+    def _sized(self, fault: Fault, onset: int, healthy: Array) -> tuple[Fault, float, int, float, int] | None:
+        """Return the fault of the most likely size, its deviation, the onset (ns), the log posterior, and from when it is whole.
 
         `healthy` is the course of the boom as believed, and `onset` that of a sensor's zero, which does not depend on it.
         Return None if the size is not certainly above that of healthy booms, if the seconds do not agree, or if the size of a
@@ -279,15 +283,15 @@ class FaultSearch:
             spread = math.hypot(spread, usual)
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
             is_known = abs(changed.size) > max(least, self._certain * spread)
-            return (changed, math.hypot(spread, drift), onset, 0.0) if is_known else None
+            return (changed, math.hypot(spread, drift), onset, 0.0, 0) if is_known else None
         least, sure = self._certain * usual, self._decision.sure
         found = likeliest(fault.size, least, sure, lambda size: self._course(fault._replace(size=size)) - healthy)
         if found is None:
             return None
         spread = math.hypot(found.spread, usual)
         is_known = abs(found.size) > self._certain * spread and found.agreement > math.sqrt(2.0 * sure)
-        begun = list(self._maker.recent)[-self._age :][found.onset].stamp
-        return (fault._replace(size=found.size), spread, begun, found.probability) if is_known else None
+        begun, whole = (list(self._maker.recent)[-self._age :][each].stamp for each in (found.onset, found.whole))
+        return (fault._replace(size=found.size), spread, begun, found.probability, whole) if is_known else None
 
     def _course(self, fault: Fault) -> Array:
         """Return the log likelihood of each second that counts as evidence, with a fault beside the named ones."""

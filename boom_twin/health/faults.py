@@ -24,7 +24,6 @@ from .sensor_check import Flags
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
 LATE = 0.02  # s, delay of the stamps of a stream
 IMPOSSIBLE = -1e9  # log likelihood of a boom whose twin fails
-WARM_UP = 10  # s of recent samples that new twins take first: they know neither motion nor zeros when they start
 QUIET = 0.1  # unknown force that the filter of a boom under less load expects, over the set one
 
 
@@ -135,9 +134,6 @@ class Follower(Protocol):
     def zeros(self, channels: Collection[str], /) -> tuple[Array, Array, Array]:
         """Return the estimated zeros of sensors, their variances, and deviations by errors of the scene."""
 
-    def doubt(self, channels: Collection[str], /) -> None:
-        """Let the zeros of these sensors drift by any amount."""
-
     def leave_out(self, masked: Flags, strokes: Flags, /) -> None:
         """Leave out measured channels, and strokes."""
 
@@ -181,7 +177,7 @@ def feed(twin: Follower, each: Hypothesis, second: Second) -> None:
 
 
 class TwinMaker:
-    """Maker of twins of a boom with faults. It keeps the `memory` newest seconds, which each new twin may take.
+    """Maker of twins of a boom with faults. It keeps the `memory` newest seconds of the boom as believed, for new twins.
 
     Attributes
     ----------
@@ -211,6 +207,10 @@ class TwinMaker:
         """Leave out failing sensors in all recent seconds."""
         self.recent = deque((each._replace(left_out=flags) for each in self.recent), self.recent.maxlen)
 
+    def forget(self, before: int) -> None:
+        """Discard the recent seconds before a stamp (ns)."""
+        self.recent = deque((each for each in self.recent if each.stamp >= before), self.recent.maxlen)
+
     def twin(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower]:
         """Return the hypothesis of these faults, and its twin before any sample."""
         each = hypothesis(self._scene, faults)
@@ -220,16 +220,12 @@ class TwinMaker:
             twin.requests.repeat(each.changed(self._change))
         return each, twin
 
-    def warm(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower] | None:
-        """Return the hypothesis of these faults, and its twin after the newest seconds; None for an impossible boom."""
+    def possible(self, faults: Sequence[Fault]) -> tuple[Hypothesis, Follower] | None:
+        """Return what `twin` does, or None for an impossible boom, such as one with a part too soft to hold it."""
         try:
-            each, twin = self.twin(faults)
-            for second in list(self.recent)[-WARM_UP:]:
-                feed(twin, each, second)
-            twin.take_innovations()
-        except BoomTwinError:  # such as one with a part too soft to hold it
+            return self.twin(faults)
+        except BoomTwinError:
             return None
-        return each, twin
 
     def repeated(self, faults: Sequence[Fault]) -> Iterator[tuple[int, Follower]]:
         """Run a twin with these faults over the recent seconds; yield each stamp with the twin after that second."""

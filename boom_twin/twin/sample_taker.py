@@ -117,11 +117,6 @@ class SampleTaker:
         assert self.judge is not None
         return self.judge.suspected, self.judge.failing_strokes
 
-    def doubt(self, channels: Collection[str]) -> None:
-        """Let the zeros of these sensors drift without bound, and those of the others by their settings."""
-        self._doubted = frozenset(channels)
-        self._boom.sensors.doubt(self._doubted)
-
     def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
         self._boom.leave_out(masked, strokes, np.zeros_like(strokes))
 
