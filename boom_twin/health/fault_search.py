@@ -271,7 +271,7 @@ class FaultSearch:
         return None
 
     def _sized(self, fault: Fault, onset: int, healthy: Array) -> tuple[Fault, float, int, float, int] | None:
-        """Return the fault of the most likely size, its deviation, the onset (ns), the log posterior, and from when it is whole.
+        """Return the fault of the most likely size, its deviation, onset (ns), log posterior, and from when (ns) it is whole.
 
         `healthy` is the course of the boom as believed, and `onset` that of a sensor's zero, which does not depend on it.
         Return None if the size is not certainly above that of healthy booms, if the seconds do not agree, or if the size of a
