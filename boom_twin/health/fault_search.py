@@ -2,7 +2,7 @@
 
 The filter of a twin gives its innovations and the log likelihood of all readings (`BoomPredictor.evidence`). A fault twin has a
 scene with one fault, or lets a sensor's zero drift. `causes` decides which fault is probable. Further twins find its size. A
-named fault becomes part of the boom as believed since its onset. So a second fault is found in the same way.
+named fault becomes part of the boom as believed. So a second fault is found in the same way.
 """
 
 from __future__ import annotations
