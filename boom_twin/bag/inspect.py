@@ -150,8 +150,9 @@ def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
     tallies = {topic.name: Tally(topic.name, topic.type) for topic in session.topics}
     read = list[tuple[SessionFile, set[int]]]()
     for file in session.files:
-        read.append((file, {key for key, channel in file.channels.items() if channel.message_encoding == CDR}))
-        for key in file.channels.keys() - read[-1][1]:
+        encoded = {key for key, channel in file.channels.items() if channel.message_encoding == CDR}
+        read.append((file, encoded))
+        for key in file.channels.keys() - encoded:
             tallies[file.channels[key].topic].count += file.counts.get(key, 0)
     blocks = SessionBlocks(read, {name: name for name in tallies}, window)
     are_stamped = [

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 
 SESSION = "a rosbag2 directory, a directory of its files, or one file: .mcap, .db3, .bag of ROS 1, .csv"
-SESSION_NAMESPACE = "ROS namespace of the node in the session, for its topics"
 SESSION_SCENE = "scene file (YAML); without it, the one that the session was made with, else the default scene"
 
 
@@ -43,14 +42,18 @@ def add_file(parser: ArgumentParser, option: str, purpose: str, metavar: str = "
     parser.add_argument(option, metavar=metavar, type=Path, help=purpose)
 
 
-def add_session(parser: ArgumentParser, params: bool = True, mapping: bool = True, scene: str = SESSION_SCENE) -> None:
-    """Declare the options by which a recorded session is read: scene, parameters, mapping, window."""
+def add_session(
+    parser: ArgumentParser, params: bool = True, mapping: bool = True, scene: str = SESSION_SCENE, namespace: bool = True
+) -> None:
+    """Declare the options by which a recorded session is read: scene, parameters, mapping, namespace, window."""
     parser.add_argument("--scene", metavar="SCENE", help=scene)
     if params:
         add_file(parser, "--params", "ROS parameter file (default: as recorded, else the package's twin.yaml)")
     if mapping:
         purpose = "mapping of topics and sensors (default: as recorded, else what `boom_twin mapping` prints)"
         add_file(parser, "--mapping", purpose)
+    if namespace:
+        add_namespace(parser, "ROS namespace of the node in the session, for its topics" + " and --params" * params)
     begin = "begin S seconds after the first sample (default 0); the model starts at rest there"
     parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help=begin)
     parser.add_argument("--duration", type=positive, metavar="S", help="read S seconds (default: all)")

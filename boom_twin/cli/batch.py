@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import UsageError
 from ..offline.progress import ProgressLine
-from .arguments import SESSION_NAMESPACE, add_namespace, add_session, at_least, positive, window_of
+from .arguments import add_session, at_least, positive, window_of
 from .output import tell
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--workers", metavar="N", type=at_least(1), help="sessions at a time (default: one per core)")
     scene = "scene file (YAML) for all sessions; without it, the one that each was made with, else the default scene"
     add_session(parser, scene=scene)
-    add_namespace(parser, f"{SESSION_NAMESPACE} and --params")
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
     parser.add_argument("--calibrate", action="store_true", help="estimate the scene's parameters from every session as well")
     fatigue = "damage of all stations, summed up by rig: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"

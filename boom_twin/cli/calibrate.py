@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from .. import __version__
 from ..errors import BoomTwinError, UsageError
 from ..offline.progress import ProgressLine
-from .arguments import SESSION_NAMESPACE, add_json, add_namespace, add_session, files_of, window_of
+from .arguments import add_json, add_session, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, warn, warn_incomplete
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     whose = "estimate the zeros of all sensors (default), of all but the stroke transducers, or none"
     parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
     add_session(parser)
-    add_namespace(parser, f"{SESSION_NAMESPACE} and --params")
     parser.add_argument("--date", metavar="DATE", help="date of the provenance (default: today)")
     parser.add_argument("--force", action="store_true", help="overwrite existing results")
     add_json(parser)

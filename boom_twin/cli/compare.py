@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 
-from .arguments import SESSION_NAMESPACE, add_json, add_namespace, add_session, window_of
+from .arguments import add_json, add_session, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell, warn
 
 
@@ -14,7 +14,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     for name in ("A", "B"):
         parser.add_argument(name, type=Path, help="a recorded session, which is replayed, or the folder of a replay")
     add_session(parser, mapping=False)
-    add_namespace(parser, f"{SESSION_NAMESPACE} and --params")
     add_json(parser)
 
 
@@ -28,10 +27,8 @@ def run(args: Namespace) -> int:
 
         def replayed(session: Path) -> Path:
             tell(f"replaying {session} ..")
-            scene, settings = (
-                open_session_scene(session, args.scene),
-                open_session_settings(session, args.params, args.namespace),
-            )
+            scene = open_session_scene(session, args.scene)
+            settings = open_session_settings(session, args.params, args.namespace)
             building = Path(mkdtemp(dir=folder))
             evaluated_replay(building, session, scene, settings, ReplayOptions(window=window, namespace=args.namespace))
             return building

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable, several
 from ..types import NANO, StrokeReading
-from .arguments import SESSION, SESSION_NAMESPACE, add_json, add_namespace, add_session, window_of
+from .arguments import SESSION, add_json, add_session, window_of
 from .output import columns, open_session_scene, print_result
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("bag", metavar="BAG", help=SESSION)
     add_session(parser, params=False)
-    add_namespace(parser, SESSION_NAMESPACE)
     add_json(parser)
 
 

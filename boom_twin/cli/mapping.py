@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .arguments import SESSION, SESSION_NAMESPACE, add_json, add_namespace, add_session, refuse_given, window_of
+from .arguments import SESSION, add_json, add_session, refuse_given, window_of
 
 if TYPE_CHECKING:
     from ..offline.commissioning import Commissioning
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--check", metavar="BAG", help=f"check how the sensors of a session are wired: {SESSION}")
     add_session(parser, params=False)
-    add_namespace(parser, SESSION_NAMESPACE)
     parser.add_argument("--out", type=Path, metavar="FILE", help="with --check: write the proposed mapping")
     add_json(parser)
 

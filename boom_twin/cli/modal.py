@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .arguments import SESSION_NAMESPACE, add_json, add_namespace, add_session, files_of, window_of
+from .arguments import add_json, add_session, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     place = "folder for modes.json and stabilisation diagrams, new or empty"
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
     add_session(parser)
-    add_namespace(parser, f"{SESSION_NAMESPACE} and --params")
     add_json(parser)
 
 

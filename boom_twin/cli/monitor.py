@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     told = "show this recorded session, or the bag of a replay (default: the live topics)"
     parser.add_argument("--bag", metavar="BAG", type=Path, help=told)
-    add_session(parser)
+    add_session(parser, namespace=False)  # `add_ros_args` has it
     parser.add_argument("--port", type=_port, help=f"TCP port (default {PORT}, or a free one if that is taken; 0: a free one)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (default 127.0.0.1); elsewhere viewers need a token")
     token = "file that holds the token, asked for on this machine too (default: a new token at each start)"

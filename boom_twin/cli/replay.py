@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..offline.progress import ProgressLine
 from ..types import StrokeReading
-from .arguments import SESSION, SESSION_NAMESPACE, add_json, add_namespace, add_session, files_of, refuse_given, window_of
+from .arguments import SESSION, add_json, add_session, files_of, refuse_given, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell, warn_incomplete
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_session(parser)
     place = "folder for summary.json, bag/, tables and pictures: new, empty, or of an earlier replay, which is replaced"
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
-    add_namespace(parser, f"{SESSION_NAMESPACE} and --params")
     purpose = "name the causes of alarms, by fault twins; takes about five times as long"
     parser.add_argument("--causes", action="store_true", help=purpose)
     parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
