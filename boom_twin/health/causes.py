@@ -67,10 +67,10 @@ class Likeliest(NamedTuple):
 
     spread : standard deviation by the jackknife over seconds, valid for an inexact model. onset : number of the first second
     from which this size, or half of it, is likelier than none: a fault grows to its size. whole : number of the first second
-    from which this size is likelier than half of it. probability : log posterior
-    probability density, up to a constant common to all faults. agreement : sum of the gains of all seconds over the root of the
-    sum of their squares. If gains are independent and symmetric about zero, it exceeds t with a probability below exp(-t^2/2)
-    (B. Efron, J. Amer. Stat. Assoc. 64 (1969), 1278-1302). Each gain is bounded by the evidence that a name needs.
+    from which this size is likelier than half of it. probability : log posterior probability density, up to a constant common
+    to all faults. agreement : sum of the gains of all seconds over the root of the sum of their squares. If gains are
+    independent and symmetric about zero, it exceeds t with a probability below exp(-t^2/2) (B. Efron, J. Amer. Stat. Assoc. 64
+    (1969), 1278-1302). Each gain is bounded by the evidence that a name needs.
     """
 
     size: float

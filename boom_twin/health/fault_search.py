@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import repeat
 from statistics import NormalDist
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,20 @@ from .sensor_check import CAME_BACK
 
 DELAY = 2  # s from the end of a second to its verdict
 SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
+
+
+class SizedFault(NamedTuple):
+    """Fault of its most likely size.
+
+    spread : standard deviation of the size. onset, whole : stamps (ns) from which the boom has the fault, and all of it.
+    probability : log posterior, up to a constant common to all faults.
+    """
+
+    fault: Fault
+    spread: float
+    onset: int
+    whole: int
+    probability: float
 
 
 class EndTest:
@@ -143,11 +158,12 @@ class FaultSearch:
                 self._begin()
             return []
         come = {list(Stream)[code] for code in np.unique(second.block.streams)}
-        if not come <= self._streams:
-            self._streams |= come
-            self._begin()
+        is_other = not come <= self._streams
+        self._streams |= come
         if second.left_out is not None and self._maker.is_news(second.left_out):  # its last readings misled all states
             self._maker.leave_out(second.left_out)
+            is_other = True
+        if is_other:
             self._begin()
         self._maker.recent.append(second)
         leaks = [] if self._reads is StrokeReading.ANGLE else self._creep.take(second.stamp, second.block)
@@ -206,24 +222,24 @@ class FaultSearch:
         # of size 0 all are the boom as believed
         healthy = np.zeros(0) if fault.kind == "off" else self._course(fault._replace(size=0.0))
         found = {place: each for place, trial in faults.items() if (each := self._sized(trial, begin, healthy)) is not None}
-        likely = {place: each[3] for place, each in found.items()}
+        likely = {place: each.probability for place, each in found.items()}
         best = max(likely, key=lambda place: likely[place], default=verdict.place)
         rivals = [likely[best] - each for place, each in likely.items() if place != best]
         if verdict.place not in found or min(rivals, default=math.inf) < self._decision.sure:
             self._unsure[verdict.place] = verdict.evidence + self._decision.sure
             return []
-        sized, spread, onset, _, whole = found[best]
-        if fault.kind == "off" and abs(sized.size) < self._certain * spread:  # its zero still drifts
+        sized = found[best]
+        if fault.kind == "off" and abs(sized.fault.size) < self._certain * sized.spread:  # its zero still drifts
             return []
-        if (before := next((each for each in self._named if each.cause == sized.cause), None)) is not None:
-            return self._changed_size(before, sized, spread, onset, whole)
-        named = sized.signed()
-        evidence = evidence_of(named, spread) if named.is_told else ""
-        part = (named.kind, named.size, spread, named.unit)
+        if (before := next((each for each in self._named if each.cause == sized.fault.cause), None)) is not None:
+            return self._changed_size(before, sized)
+        named = sized.fault.signed()
+        evidence = evidence_of(named, sized.spread) if named.is_told else ""
+        part = (named.kind, named.size, sized.spread, named.unit)
         ranked = verdict.ranked if len(likely) == 1 else self._ranked(verdict, likely)
         causes = tuple(Ranked(cause, p, (part,) if cause == named.cause else ()) for cause, p in ranked)
-        alarm = self._named[named] = Alarm(named.channel, named.kind, onset, None, named.cause, evidence, causes)
-        self._begin(whole)  # the seconds before were of another boom
+        alarm = self._named[named] = Alarm(named.channel, named.kind, sized.onset, None, named.cause, evidence, causes)
+        self._begin(sized.whole)  # the seconds before were of another boom
         return [alarm] if named.is_told else []
 
     def _ranked(self, verdict: Verdict, likely: dict[int, float]) -> list[tuple[str, float]]:
@@ -245,13 +261,14 @@ class FaultSearch:
         is_off = any(each.cause == f"joint_{number}.sensor" for each in self._named)
         return is_off or number - 1 in self._creep.creeping or age < CREEP_SPAN * SECOND
 
-    def _changed_size(self, named: Fault, change: Fault, spread: float, onset: int, whole: int) -> list[Alarm]:
+    def _changed_size(self, named: Fault, change: SizedFault) -> list[Alarm]:
         """Change the size of a named fault; if the rest is that of a healthy boom, end the fault and return its alarm."""
-        left = named.changed_by(change)
-        if abs(left.size) < self._certain * math.hypot(spread, usual_size(self._scene, left, self._settings.scene_error)):
-            return self._ended(named, onset)
+        left = named.changed_by(change.fault)
+        usual = usual_size(self._scene, left, self._settings.scene_error)
+        if abs(left.size) < self._certain * math.hypot(change.spread, usual):
+            return self._ended(named, change.onset)
         self._named[left] = self._named.pop(named)
-        self._begin(whole)
+        self._begin(change.whole)
         return []
 
     def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
@@ -270,10 +287,11 @@ class FaultSearch:
                     return fault
         return None
 
-    def _sized(self, fault: Fault, onset: int, healthy: Array) -> tuple[Fault, float, int, float, int] | None:
-        """Return the fault of the most likely size, its deviation, onset (ns), log posterior, and from when (ns) it is whole.
+    def _sized(self, fault: Fault, onset: int, healthy: Array) -> SizedFault | None:
+        """Return the fault of the most likely size.
 
-        `healthy` is the course of the boom as believed, and `onset` that of a sensor's zero, which does not depend on it.
+        `healthy` is the course of the boom as believed, and `onset` that of a sensor's zero, which does not depend on it. The
+        boom does not change by a sensor, so it counts as whole from the beginning.
         Return None if the size is not certainly above that of healthy booms, if the seconds do not agree, or if the size of a
         force fault is below `Settings.force_deviation`.
         """
@@ -283,7 +301,7 @@ class FaultSearch:
             spread = math.hypot(spread, usual)
             least = self._settings.force_deviation if fault.channel.startswith("cylinder_force_") else 0.0
             is_known = abs(changed.size) > max(least, self._certain * spread)
-            return (changed, math.hypot(spread, drift), onset, 0.0, 0) if is_known else None
+            return SizedFault(changed, math.hypot(spread, drift), onset, 0, 0.0) if is_known else None
         least, sure = self._certain * usual, self._decision.sure
         found = likeliest(fault.size, least, sure, lambda size: self._course(fault._replace(size=size)) - healthy)
         if found is None:
@@ -291,7 +309,7 @@ class FaultSearch:
         spread = math.hypot(found.spread, usual)
         is_known = abs(found.size) > self._certain * spread and found.agreement > math.sqrt(2.0 * sure)
         begun, whole = (list(self._maker.recent)[-self._age :][each].stamp for each in (found.onset, found.whole))
-        return (fault._replace(size=found.size), spread, begun, found.probability, whole) if is_known else None
+        return SizedFault(fault._replace(size=found.size), spread, begun, whole, found.probability) if is_known else None
 
     def _course(self, fault: Fault) -> Array:
         """Return the log likelihood of each second that counts as evidence, with a fault beside the named ones."""

@@ -78,6 +78,7 @@ class HealthMonitor:
             if stream is not Stream.STROKES or stream is self._drive
         }
         self._measured: list[Stream] = [stream for stream in self._channels if stream is not Stream.STROKES]
+        self._compared = [stream for stream in self._measured if stream is not self._drive]
         self._imus = [stream for stream in self._channels if SENSORS[stream].is_accelerometer]
         self._lags = LagMonitor(self._drive)
         compared = [stream for stream in SIGMAS if stream is not self._drive]
@@ -201,11 +202,10 @@ class HealthMonitor:
         """Return the alarms that a block begins or ends."""
         drive, news = self.checks[self._drive], list[Alarm]()
         is_followed = drive.largest_sigma(block.end) < self._uncertain
-        for stream in self._measured:
-            if stream is not self._drive:
-                findings = self.checks[stream].take(block, self._sensors[stream].masked, is_followed)
-                news += self._told_by(stream, findings, block)
-        is_shaken = any(self.checks[stream].is_bent for stream in self._measured if stream is not self._drive)
+        for stream in self._compared:
+            findings = self.checks[stream].take(block, self._sensors[stream].masked, is_followed)
+            news += self._told_by(stream, findings, block)
+        is_shaken = any(self.checks[stream].is_bent for stream in self._compared)
         findings = drive.take(block, self._sensors[self._drive].masked, not is_shaken)
         if is_followed and not self._sensors[self._drive].masked.any():
             news += self._compare(block)
@@ -213,7 +213,7 @@ class HealthMonitor:
 
     def _compare(self, block: Block) -> list[Alarm]:
         """Compare readings with the prediction."""
-        news, checks = list[Alarm](), {stream: self.checks[stream] for stream in self._measured if stream is not self._drive}
+        news, checks = list[Alarm](), {stream: self.checks[stream] for stream in self._compared}
         failing = {stream: sensors.masked for stream, sensors in self._sensors.items()}
         if self._drive is not Stream.ANGLES:
             news += self._wiring.take(block, self.checks, failing)

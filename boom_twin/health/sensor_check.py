@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..scene.schema import Scene
 from ..types import GIVE, NANO, Array, Integers, Mount, Stream, channels_of
 from .sensor_findings import HAS_FINDING, IS_BENT, collect, examine
-from .sensor_survey import BEFORE, LATELY, ROWS, TAKEN, CheckWork, SlowMeans
+from .sensor_survey import BEFORE, IS_NOISY, LATELY, OUTSIDE, ROWS, SILENT, SPIKES, STUCK, TAKEN, CheckWork, SlowMeans
 
 Flags = NDArray[np.bool_]
 
@@ -177,10 +177,10 @@ class SensorCheck:
         self.is_bent = bool(state & IS_BENT)
         if not state & HAS_FINDING:
             return self._calm
-        stuck, noise, spikes, silent, outside = self._work.flags.copy()
-        jumped = self._work.jumped.copy()
+        flags, jumped = self._work.flags.copy(), self._work.jumped.copy()
         by_kind = {
-            "stuck": stuck, "noise": noise, "spikes": spikes, "jump": jumped != 0.0, "dropout": silent, "range": outside,
+            "stuck": flags[STUCK], "noise": flags[IS_NOISY], "spikes": flags[SPIKES], "jump": jumped != 0.0,
+            "dropout": flags[SILENT], "range": flags[OUTSIDE],
         }  # fmt: skip
         return SensorFindings(by_kind, jumped, self.newest[1].copy())
 

@@ -154,13 +154,13 @@ def find(sensors, stamps, raw, left, largest, now, is_known, fastest):
 def most_repeats(sensors, i):
     """Return how often the sensor of channel i repeats a reading before it is stuck: a coarse one at rest for long."""
     step = read_out(sensors, i)
-    needed = readings_of_frozen(sensors.sigma, step, FALSE_ALARM) - 1.0
+    needed = readings_of_frozen(sensors.sigma, step) - 1.0
     return max(needed, LEAST_REPEATS) if step > 0.0 else math.inf
 
 
 @inner
-def readings_of_frozen(sigma, resolution, false_alarm):
-    """Return the number of equal readings in a row that white noise gives with a probability below `false_alarm` each.
+def readings_of_frozen(sigma, resolution):
+    """Return the number of equal readings in a row that white noise gives with a probability below `FALSE_ALARM` each.
 
     Noise of standard deviation s, `QUIET` of the stated `sigma`, repeats a reading in steps of q with a probability of at most
 
@@ -174,7 +174,7 @@ def readings_of_frozen(sigma, resolution, false_alarm):
     missed = math.erfc(resolution / (2.0 * math.sqrt(2.0) * QUIET * sigma))
     if missed == 0.0:
         return math.inf
-    return 2.0 if missed == 1.0 else max(2.0, 1.0 + math.ceil(math.log(false_alarm) / math.log1p(-missed)))
+    return 2.0 if missed == 1.0 else max(2.0, 1.0 + math.ceil(math.log(FALSE_ALARM) / math.log1p(-missed)))
 
 
 @inner
